@@ -1,0 +1,44 @@
+#pragma once
+// scene.glb: the result of a bake, written and read. core/artifact/README.md specifies every byte.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/artifact/import.h"
+#include "core/base/result.h"
+#include "core/prt/transfer.h"
+#include "core/scene/scene.h"
+
+namespace kiln {
+
+/// The light a bake was asked for: what stock viewers see, and what `eval` without --env uses.
+struct BakedLight {
+  std::string name;
+  std::vector<Vec3f> coefficients;  // sh_count(order) RGB; empty when no environment was given
+};
+
+struct BakedScene {
+  Scene scene;             // final geometry and the original materials, textures and lights
+  Transfer transfer;       // of scene.mesh's vertices
+  BakedLight light;
+  float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
+  std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
+};
+
+struct Encoding {
+  int position_bits = 16;     // over the unit cube, one grid for all primitives (no cracks)
+  int normal_bits = 12;
+  int texcoord_bits = 14;
+  int coefficient_bits = 12;  // of each _PRT_n slot over its own range
+  int speed = 5;              // Draco 0 (small) .. 10 (fast)
+};
+
+/// The bytes of a GLB. Draco reorders vertices: what read_baked_glb gives back is the delivered order.
+Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
+
+/// Reads what write_baked_glb wrote, exactly as a viewer decodes it. Validates every index and range.
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
+
+}  // namespace kiln

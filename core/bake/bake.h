@@ -1,0 +1,43 @@
+#pragma once
+// One bake from bytes to artefacts: the outline of the whole service.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/artifact/import.h"
+#include "core/bake/recipe.h"
+#include "core/base/progress.h"
+#include "core/base/result.h"
+#include "core/base/threads.h"
+
+namespace kiln {
+
+/// Part of every result's identity: the same scene, recipe and engine give the same bytes.
+inline constexpr const char* kEngineVersion = "0.1.0";
+
+struct BakeInput {
+  SceneFiles scene;
+  Recipe recipe;
+  Bytes environment;             // the file the recipe's environment names; empty for constant, built-in or none
+  std::string environment_name;
+};
+
+/// Named files with their media types: scene.glb, preview.png, report.json, log.txt.
+struct ArtifactFile {
+  std::string name;
+  std::string media_type;
+  Bytes bytes;
+};
+
+struct BakeOutput {
+  std::vector<ArtifactFile> files;
+};
+
+/// Bakes. Throws Cancelled when `threads` is stopped; a Fault names what is wrong with the input.
+Result<BakeOutput> bake(const BakeInput&, const Progress&, Threads&);
+
+/// The plan of a bake as JSON (what is modelled, what skipped and why, predictions), nothing baked.
+Result<std::string> plan_json(const BakeInput&, Threads&);
+
+}  // namespace kiln

@@ -1,0 +1,79 @@
+#pragma once
+// A recipe: what a user asks of a bake, parsed once into types. contract.md section 4 is its outside.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/prt/subdivide.h"
+
+namespace kiln {
+
+/// One mistake in a JSON document. A document's mistakes are reported together.
+struct FieldError {
+  std::string pointer;   // RFC 6901: "/steps/0/order"
+  std::string detail;    // "must be an integer from 1 to 10"
+  std::string received;  // compact JSON of what stood there; empty when missing
+  std::string allowed;   // what may stand there
+};
+
+struct EnvironmentChoice {
+  enum class Kind { none, constant, asset, file, builtin } kind = Kind::none;
+  Vec3f constant;
+  std::string name;          // sha256 of the asset, path of the file, or name of the built-in sky
+  float rotation_deg = 0;
+  float intensity = 1;
+};
+
+struct PrtStep {
+  std::optional<int> order;            // auto when absent
+  std::optional<int> bounces;
+  std::optional<int> samples;
+  struct Subdivision {
+    SplitMeasure measure = SplitMeasure::residual;
+    float alpha = 1;
+    std::optional<float> threshold;
+    std::optional<std::uint64_t> triangles;  // budget of the final mesh
+    int max_depth = 8;
+  };
+  std::optional<Subdivision> subdivide;  // absent: no splits
+  std::optional<int> coefficient_bits;
+};
+
+enum class Quality { draft, standard, final_ };
+
+struct Limits {
+  std::uint64_t memory_mb = 4096;
+  int threads = 0;
+  double wall_s = 3600;
+};
+
+struct Recipe {
+  std::string scene_asset;  // sha256; empty when the scene is given otherwise
+  EnvironmentChoice environment;
+  std::vector<PrtStep> steps;
+  Quality quality = Quality::standard;
+  std::uint64_t seed = 0;
+  Limits limits;
+  bool strict = false;
+  bool certificate = true;
+  std::string label;
+};
+
+/// Parses and checks a recipe. All mistakes at once.
+tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view json);
+
+/// The recipe as canonical JSON (every field, sorted keys): equal recipes give equal text.
+std::string recipe_json(const Recipe&);
+
+/// The JSON Schema (draft 7) that parse_recipe enforces, and the named presets (name -> recipe JSON).
+std::string recipe_schema();
+struct Preset {
+  std::string name, description, recipe;
+};
+const std::vector<Preset>& presets();
+
+}  // namespace kiln

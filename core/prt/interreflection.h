@@ -1,0 +1,42 @@
+#pragma once
+// Diffuse interreflection in RGB: Neumann series gathered over the vertices of the mesh.
+//   T_0 = D,   T_{k+1} = D + K T_k,   (K T)(x) = 1/pi * integral of rho(y) T(y) (n.w) dw,  y = first hit along w
+// After `bounces` passes T holds exactly the light of up to that many reflections.
+// Shape   in: D[v * slots + i] grey (slots = order^2, one more when `fixed`; the fixed slot is RGB and given apart)
+//         out: Transfer with 3 channels
+// Memory  at most 600 bytes per vertex at order 6, all told (anchor of issue 2)
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/threads.h"
+#include "core/prt/direct_transfer.h"
+#include "core/prt/transfer.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+
+struct Interreflection {
+  int order = 6;
+  int bounces = 1;           // passes, >= 0
+  int samples = 256;         // closest-hit rays per vertex and pass
+  std::uint64_t seed = 0;
+};
+
+/// `direct` has sh_count(order) values per vertex; `fixed_direct` is empty or one RGB per vertex (direct light of the
+/// scene's lamps). Called with bounces = 0 it only joins the two. Vertices are those of tracer.scene().mesh or of a
+/// refinement of it: `mesh` names the vertices, and must have the tracer's surface.
+Transfer bake_interreflection(const Tracer&, const Mesh& mesh, std::vector<float> direct,
+                              std::vector<Vec3f> fixed_direct, const Interreflection&, Threads&,
+                              TransferStats* stats = nullptr);
+
+/// Direct light of emitters and punctual lights at points: irradiance / pi, RGB.
+struct FixedDirect {
+  int samples = 256;         // shadow rays per point over all emitters; one per punctual light besides
+  std::uint64_t seed = 0;
+};
+std::vector<Vec3f> bake_fixed_direct(const Tracer&, std::span<const TransferPoint>, const FixedDirect&, Threads&,
+                                     TransferStats* stats = nullptr);
+
+}  // namespace kiln

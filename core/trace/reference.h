@@ -1,0 +1,51 @@
+#pragma once
+// The brute-force truth: a unidirectional path estimator in the simplest form that can be right.
+//
+//   value(x, n) = irradiance / pi = radiance that leaves a white Lambertian point
+//               = 1/pi * integral over the hemisphere of n of L(x, w) (n.w) dw
+// Paper   Kajiya 1986.   Units  W m^-2 sr^-1.   Repeat  same bits for any thread count.
+// Cost    points x samples x path length closest-hit rays (one more shadow ray per vertex for local lights).
+// Error   unbiased up to `bounces`; standard error from the two halves of the samples.
+// Simple  double accumulation, no adaptivity, no reuse, no clamping.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/threads.h"
+#include "core/base/vec.h"
+#include "core/scene/environment.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+
+struct ReferencePoint {
+  Vec3f position;  // unit-cube coordinates, on the surface; the estimator offsets it along `face_normal`
+  Vec3f normal;    // shading normal
+  Vec3f face_normal;
+};
+
+/// Distant light for the estimator: full-detail environments, or environments projected to SH (may be negative).
+struct ReferenceLight {
+  std::vector<Environment> environments;         // each is one lighting
+  int sh_order = 0;                              // > 0: `sh` holds further lightings, one per entry
+  std::vector<std::vector<Vec3f>> sh;            // [lighting][sh_count(sh_order)]
+  bool scene_lights = false;                     // one more lighting, last: emitters and punctual lights of the scene
+};
+
+struct ReferenceOptions {
+  int samples = 1024;      // per point
+  int bounces = -1;        // -1: until Russian roulette ends the path (unbiased); 0: direct only
+  std::uint64_t seed = 0;
+};
+
+/// All lightings are estimated along the same paths. Index: lighting * points + point.
+struct ReferenceResult {
+  std::vector<Vec3d> value;           // mean of both halves
+  std::vector<Vec3d> half_a, half_b;  // independent halves (even and odd samples)
+};
+
+ReferenceResult trace_reference(const Tracer&, std::span<const ReferencePoint>, const ReferenceLight&,
+                                const ReferenceOptions&, Threads&);
+
+}  // namespace kiln

@@ -1,0 +1,31 @@
+#pragma once
+// What a ray finds where it lands.
+
+#include "core/base/vec.h"
+#include "core/scene/scene.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+
+struct SurfacePoint {
+  Vec3f position;          // on the face, not offset
+  Vec3f geometric_normal;  // of the face, by winding
+  Vec3f normal;            // interpolated vertex normal, unit; in the half space of geometric_normal
+  std::uint32_t triangle = 0;
+  float u = 0, v = 0;
+};
+
+SurfacePoint surface_point(const Scene&, std::uint32_t triangle, float u, float v);
+
+/// Linear reflectance at a point: base colour factor x texture x vertex colour, clamped to [0, 0.999].
+/// Kiln models every surface as Lambertian with this albedo (metals too: their reflectance is kept, its direction is not).
+Vec3f albedo_at(const Scene&, const SurfacePoint&);
+/// Emitted radiance, front faces (both for double-sided materials).
+Vec3f emission_at(const Scene&, const SurfacePoint&);
+/// Coverage: 1 unless the material's alpha mode is mask (0 or 1) or blend.
+float opacity_at(const Scene&, const SurfacePoint&);
+
+/// Bilinear (or nearest) texel fetch with wrapping, as stored: sRGB decoded when `srgb`. White when the pixels are absent.
+Vec4f sample_texture(const Scene&, const TextureRef&, const Vec2f& uv, bool srgb);
+
+}  // namespace kiln
