@@ -19,7 +19,7 @@ inline constexpr const char* kEngineVersion = "0.1.0";
 struct BakeInput {
   SceneFiles scene;
   Recipe recipe;
-  Bytes environment;             // the file the recipe's environment names; empty for constant, built-in or none
+  Bytes environment;  // the file the recipe's environment names; empty for constant, built-in or none
   std::string environment_name;
 };
 

@@ -23,27 +23,28 @@ struct FieldError {
 struct EnvironmentChoice {
   enum class Kind { none, constant, asset, file, builtin } kind = Kind::none;
   Vec3f constant;
-  std::string name;          // sha256 of the asset, path of the file, or name of the built-in sky
+  std::string name;  // sha256 of the asset, path of the file, or name of the built-in sky
   float rotation_deg = 0;
   float intensity = 1;
 };
 
 struct PrtStep {
-  std::optional<int> order;            // auto when absent
+  std::optional<int> order;  // auto when absent
   std::optional<int> bounces;
   std::optional<int> samples;
   struct Subdivision {
+    enum class Mode { automatic, off, on } mode = Mode::automatic;  // automatic: the plan gives budget and threshold
     SplitMeasure measure = SplitMeasure::residual;
     float alpha = 1;
     std::optional<float> threshold;
     std::optional<std::uint64_t> triangles;  // budget of the final mesh
     int max_depth = 8;
   };
-  std::optional<Subdivision> subdivide;  // absent: no splits
+  Subdivision subdivide;
   std::optional<int> coefficient_bits;
 };
 
-enum class Quality { draft, standard, final_ };
+enum class Quality { draft, standard, finest };  // "draft", "standard", "final"
 
 struct Limits {
   std::uint64_t memory_mb = 4096;
@@ -68,6 +69,9 @@ tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view json
 
 /// The recipe as canonical JSON (every field, sorted keys): equal recipes give equal text.
 std::string recipe_json(const Recipe&);
+
+/// The part of recipe_json that decides the artefacts' bytes (no label, no limits, no scene): a key for result caches.
+std::string recipe_identity(const Recipe&);
 
 /// The JSON Schema (draft 7) that parse_recipe enforces, and the named presets (name -> recipe JSON).
 std::string recipe_schema();

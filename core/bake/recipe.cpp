@@ -1,0 +1,268 @@
+#include "core/bake/recipe.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/bake/json_fields.h"
+#include "core/sphere/sh.h"
+
+namespace kiln {
+namespace {
+
+using Errors = std::vector<FieldError>;
+using nlohmann::json;
+
+constexpr std::int64_t kMaxBudget = 50'000'000;
+constexpr std::int64_t kMaxExactInteger = 9'007'199'254'740'991;  // 2^53 - 1: what a JSON number holds everywhere
+
+bool is_sha256(const std::string& text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+std::string read_asset(JsonFields& fields) {
+  const auto asset = fields.text("asset", 64);
+  if (!asset) return {};
+  if (!is_sha256(*asset)) fields.error("asset", "must be a SHA-256 in lower-case hex", "64 hex digits");
+  return *asset;
+}
+
+std::optional<Vec3f> read_rgb(JsonFields& fields, const std::string& name) {
+  const json* field = fields.find(name);
+  if (!field) return std::nullopt;
+  Vec3f rgb;
+  bool good = field->is_array() && field->size() == 3;
+  for (std::size_t i = 0; good && i < 3; ++i) {
+    good = (*field)[i].is_number();
+    if (!good) break;
+    const double x = (*field)[i].get<double>();
+    good = x >= 0 && x <= 1e9;
+    rgb[i] = static_cast<float>(x);
+  }
+  if (good) return rgb;
+  fields.error(name, "must be three numbers from 0 to 1e9", "[r, g, b]");
+  return std::nullopt;
+}
+
+EnvironmentChoice read_environment(const json& value, Errors& errors) {
+  using Kind = EnvironmentChoice::Kind;
+  EnvironmentChoice choice;
+  JsonFields fields(value, "/environment", errors);
+  int sources = 0;
+  const auto note = [&](Kind kind, std::string name) {
+    choice.kind = kind;
+    choice.name = std::move(name);
+    ++sources;
+  };
+  if (fields.has("asset")) note(Kind::asset, read_asset(fields));
+  if (fields.has("file")) note(Kind::file, fields.text("file", 4096).value_or(""));
+  if (const auto rgb = read_rgb(fields, "constant")) {
+    note(Kind::constant, "");
+    choice.constant = *rgb;
+  }
+  constexpr const char* kSkies[] = {"uniform", "overcast", "clear"};
+  if (const auto sky = fields.word("builtin", {kSkies[0], kSkies[1], kSkies[2]})) note(Kind::builtin, kSkies[*sky]);
+  choice.rotation_deg = static_cast<float>(fields.number("rotation_deg", -360, 360).value_or(0));
+  choice.intensity = static_cast<float>(fields.number("intensity", 0, 1e9).value_or(1));
+  fields.finish();
+  if (sources > 1 && value.is_object()) {
+    errors.push_back(
+        {"/environment", "names more than one light", shown(value), "one of asset, file, constant, builtin"});
+  }
+  return choice;
+}
+
+PrtStep::Subdivision read_subdivision(const json& value, const std::string& pointer, Errors& errors) {
+  using Mode = PrtStep::Subdivision::Mode;
+  PrtStep::Subdivision out;
+  if (value.is_string()) {
+    const auto& word = value.get_ref<const std::string&>();
+    out.mode = word == "off" ? Mode::off : Mode::automatic;
+    if (word != "off" && word != "auto")
+      errors.push_back({pointer, "must be auto, off or an object", shown(value), "auto, off, object"});
+    return out;
+  }
+  out.mode = Mode::on;
+  JsonFields fields(value, pointer, errors);
+  constexpr SplitMeasure kMeasures[] = {SplitMeasure::residual, SplitMeasure::eq2, SplitMeasure::eq3,
+                                        SplitMeasure::eq4};
+  if (const auto measure = fields.word("measure", {"residual", "eq2", "eq3", "eq4"})) out.measure = kMeasures[*measure];
+  out.alpha = static_cast<float>(fields.number("alpha", 0, 1e6).value_or(1));
+  if (const auto threshold = fields.number("threshold", 0, 1e30)) out.threshold = static_cast<float>(*threshold);
+  if (const auto triangles = fields.integer_or_auto("triangles", 1, kMaxBudget))
+    out.triangles = static_cast<std::uint64_t>(*triangles);
+  out.max_depth = static_cast<int>(fields.integer("max_depth", 0, 16).value_or(8));
+  fields.finish();
+  return out;
+}
+
+void read_encoding(const json& value, const std::string& pointer, PrtStep& step, Errors& errors) {
+  JsonFields fields(value, pointer, errors);
+  fields.word("form", {"auto", "raw"});
+  if (const auto bits = fields.integer_or_auto("bits", 4, 20)) step.coefficient_bits = static_cast<int>(*bits);
+  fields.finish();
+}
+
+PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  PrtStep step;
+  const auto small = [&](const char* name, std::int64_t low, std::int64_t high) -> std::optional<int> {
+    const auto value = fields.integer_or_auto(name, low, high);
+    return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
+  };
+  step.order = small("order", 1, kMaxShOrder);
+  step.bounces = small("bounces", 0, 64);
+  step.samples = small("samples", 1, 65536);
+  fields.word("solver", {"vertices"});
+  fields.word("glossy", {"auto", "off"});
+  if (const json* value = fields.find("subdivide"))
+    step.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
+  if (const json* value = fields.find("encoding")) read_encoding(*value, pointer + "/encoding", step, errors);
+  return step;
+}
+
+std::vector<PrtStep> read_steps(const json& value, Errors& errors) {
+  std::vector<PrtStep> steps;
+  if (!value.is_array() || value.size() != 1) {
+    errors.push_back({"/steps", "must be a list with one step", shown(value), "[{\"do\": \"prt\"}]"});
+    return steps;
+  }
+  JsonFields fields(value[0], "/steps/0", errors);
+  if (!fields.find("do", true)) return steps;
+  if (!fields.word("do", {"prt"})) return steps;
+  steps.push_back(read_prt(fields, "/steps/0", errors));
+  fields.finish();
+  return steps;
+}
+
+Limits read_limits(const json& value, Errors& errors) {
+  Limits limits;
+  JsonFields fields(value, "/limits", errors);
+  limits.memory_mb = static_cast<std::uint64_t>(fields.integer("memory_mb", 64, 1 << 20).value_or(4096));
+  limits.threads = static_cast<int>(fields.integer("threads", 0, 1024).value_or(0));
+  limits.wall_s = fields.number("wall_s", 0.1, 30.0 * 86400).value_or(3600);
+  fields.finish();
+  return limits;
+}
+
+bool is_utf8_text(const std::string& text) {
+  try {
+    return json(text).dump().size() >= 2 && text.find('\0') == std::string::npos;
+  } catch (const json::exception&) {
+    return false;
+  }
+}
+
+Recipe read_recipe(const json& document, Errors& errors) {
+  Recipe recipe;
+  JsonFields fields(document, "", errors);
+  if (const json* scene = fields.find("scene")) {
+    JsonFields scene_fields(*scene, "/scene", errors);
+    recipe.scene_asset = read_asset(scene_fields);
+    scene_fields.finish();
+  }
+  if (const json* value = fields.find("environment")) recipe.environment = read_environment(*value, errors);
+  if (const json* value = fields.find("steps"))
+    recipe.steps = read_steps(*value, errors);
+  else
+    recipe.steps = {PrtStep{}};
+  constexpr Quality kQualities[] = {Quality::draft, Quality::standard, Quality::finest};
+  if (const auto quality = fields.word("quality", {"draft", "standard", "final"}))
+    recipe.quality = kQualities[*quality];
+  recipe.seed = static_cast<std::uint64_t>(fields.integer("seed", 0, kMaxExactInteger).value_or(0));
+  if (const json* value = fields.find("limits")) recipe.limits = read_limits(*value, errors);
+  recipe.strict = fields.boolean("strict").value_or(false);
+  recipe.certificate = fields.boolean("certificate").value_or(true);
+  recipe.label = fields.text("label", 200).value_or("");
+  if (!is_utf8_text(recipe.label)) fields.error("label", "must be UTF-8 text without NUL", "text");
+  fields.finish();
+  return recipe;
+}
+
+json environment_json(const EnvironmentChoice& choice) {
+  using Kind = EnvironmentChoice::Kind;
+  if (choice.kind == Kind::none) return nullptr;
+  json out = {{"rotation_deg", choice.rotation_deg}, {"intensity", choice.intensity}};
+  if (choice.kind == Kind::constant) out["constant"] = {choice.constant.x, choice.constant.y, choice.constant.z};
+  if (choice.kind == Kind::asset) out["asset"] = choice.name;
+  if (choice.kind == Kind::file) out["file"] = choice.name;
+  if (choice.kind == Kind::builtin) out["builtin"] = choice.name;
+  return out;
+}
+
+template <class T>
+json or_auto(const std::optional<T>& value) {
+  return value ? json(*value) : json("auto");
+}
+
+json subdivision_json(const PrtStep::Subdivision& s) {
+  using Mode = PrtStep::Subdivision::Mode;
+  if (s.mode != Mode::on) return s.mode == Mode::off ? "off" : "auto";
+  constexpr const char* kNames[] = {"residual", "eq2", "eq3", "eq4"};
+  json out = {{"measure", kNames[static_cast<int>(s.measure)]},
+              {"alpha", s.alpha},
+              {"triangles", or_auto(s.triangles)},
+              {"max_depth", s.max_depth}};
+  if (s.threshold) out["threshold"] = *s.threshold;
+  return out;
+}
+
+json step_json(const PrtStep& step) {
+  return {{"do", "prt"},
+          {"order", or_auto(step.order)},
+          {"bounces", or_auto(step.bounces)},
+          {"samples", or_auto(step.samples)},
+          {"subdivide", subdivision_json(step.subdivide)},
+          {"encoding", {{"form", "auto"}, {"bits", or_auto(step.coefficient_bits)}}}};
+}
+
+}  // namespace
+
+tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view text) {
+  if (text.size() > (1U << 20)) return tl::make_unexpected(Errors{{"", "is larger than 1 MiB", "", ""}});
+  const auto depth_guard = [](int depth, json::parse_event_t, json&) { return depth <= 32; };
+  const json document = json::parse(text, depth_guard, false);
+  if (document.is_discarded()) return tl::make_unexpected(Errors{{"", "is not valid JSON", "", "a JSON object"}});
+  Errors errors;
+  Recipe recipe = read_recipe(document, errors);
+  if (!errors.empty()) return tl::make_unexpected(std::move(errors));
+  return recipe;
+}
+
+std::string recipe_identity(const Recipe& recipe) {
+  json out = json::parse(recipe_json(recipe));
+  for (const char* field : {"label", "limits", "scene"}) out.erase(field);
+  return out.dump();
+}
+
+std::string recipe_json(const Recipe& recipe) {
+  constexpr const char* kQualities[] = {"draft", "standard", "final"};
+  json out = {
+      {"quality", kQualities[static_cast<int>(recipe.quality)]},
+      {"seed", recipe.seed},
+      {"limits",
+       {{"memory_mb", recipe.limits.memory_mb}, {"threads", recipe.limits.threads}, {"wall_s", recipe.limits.wall_s}}},
+      {"strict", recipe.strict},
+      {"certificate", recipe.certificate},
+      {"label", recipe.label},
+      {"steps", json::array()}};
+  for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
+  if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
+  if (const json environment = environment_json(recipe.environment); !environment.is_null())
+    out["environment"] = environment;
+  return out.dump();
+}
+
+const std::vector<Preset>& presets() {
+  static const std::vector<Preset> all = {
+      {"prt", "Relightable diffuse light, adaptive, under a clear sky with sun",
+       R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"}})"},
+      {"prt-draft", "The same, coarse and quick",
+       R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"draft"})"},
+      {"prt-final", "The same, for delivery",
+       R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"final"})"},
+      {"overcast", "Relightable diffuse light under an overcast sky",
+       R"({"steps":[{"do":"prt"}],"environment":{"builtin":"overcast"}})"},
+      {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},
+  };
+  return all;
+}
+
+}  // namespace kiln

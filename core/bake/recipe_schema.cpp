@@ -1,0 +1,82 @@
+// The JSON Schema of a recipe, beside the parser that enforces it: tests hold the two against each other.
+#include "core/bake/recipe.h"
+
+namespace kiln {
+
+std::string recipe_schema() {
+  return R"json({
+  "$schema": "http://json-schema.org/draft-07/schema#",
+  "$id": "https://kiln.invalid/v1/schema/recipe.json",
+  "title": "Kiln recipe",
+  "type": "object",
+  "additionalProperties": false,
+  "definitions": {
+    "sha256": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
+    "auto": {"const": "auto"}
+  },
+  "properties": {
+    "scene": {"type": "object", "additionalProperties": false, "properties": {"asset": {"$ref": "#/definitions/sha256"}}},
+    "environment": {
+      "type": "object", "additionalProperties": false,
+      "description": "Distant light. At most one of asset, file (command line only), constant and builtin; none of them, or no environment: the scene's own lights.",
+      "properties": {
+        "asset": {"$ref": "#/definitions/sha256"},
+        "file": {"type": "string", "maxLength": 4096},
+        "constant": {"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "number", "minimum": 0, "maximum": 1e9}},
+        "builtin": {"enum": ["uniform", "overcast", "clear"]},
+        "rotation_deg": {"type": "number", "minimum": -360, "maximum": 360, "default": 0},
+        "intensity": {"type": "number", "minimum": 0, "maximum": 1e9, "default": 1}
+      }
+    },
+    "steps": {
+      "type": "array", "minItems": 1, "maxItems": 1, "default": [{"do": "prt"}],
+      "items": {
+        "type": "object", "required": ["do"], "additionalProperties": false,
+        "properties": {
+          "do": {"enum": ["prt"]},
+          "order": {"description": "SH bands; coefficients = order^2", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 10}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+          "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 64}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+          "samples": {"description": "rays per vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+          "solver": {"enum": ["vertices"], "default": "vertices"},
+          "glossy": {"enum": ["auto", "off"], "default": "auto"},
+          "subdivide": {
+            "default": "auto",
+            "anyOf": [{"enum": ["auto", "off"]}, {
+              "type": "object", "additionalProperties": false,
+              "properties": {
+                "measure": {"enum": ["residual", "eq2", "eq3", "eq4"], "default": "residual"},
+                "alpha": {"type": "number", "minimum": 0, "maximum": 1e6, "default": 1},
+                "threshold": {"description": "split while the measure is above", "type": "number", "minimum": 0, "maximum": 1e30},
+                "triangles": {"description": "budget of the final mesh", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 50000000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+                "max_depth": {"type": "integer", "minimum": 0, "maximum": 16, "default": 8}
+              }
+            }]
+          },
+          "encoding": {
+            "type": "object", "additionalProperties": false,
+            "properties": {
+              "form": {"enum": ["auto", "raw"], "default": "auto"},
+              "bits": {"anyOf": [{"type": "integer", "minimum": 4, "maximum": 20}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+            }
+          }
+        }
+      }
+    },
+    "quality": {"enum": ["draft", "standard", "final"], "default": "standard"},
+    "seed": {"type": "integer", "minimum": 0, "maximum": 9007199254740991, "default": 0},
+    "limits": {
+      "type": "object", "additionalProperties": false,
+      "properties": {
+        "memory_mb": {"type": "integer", "minimum": 64, "maximum": 1048576, "default": 4096},
+        "threads": {"description": "0: all", "type": "integer", "minimum": 0, "maximum": 1024, "default": 0},
+        "wall_s": {"type": "number", "minimum": 0.1, "maximum": 2592000, "default": 3600}
+      }
+    },
+    "strict": {"description": "refuse what would be a warning", "type": "boolean", "default": false},
+    "certificate": {"description": "measure the error of the result", "type": "boolean", "default": true},
+    "label": {"type": "string", "maxLength": 200, "default": ""}
+  }
+})json";
+}
+
+}  // namespace kiln
