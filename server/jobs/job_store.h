@@ -1,0 +1,133 @@
+#pragma once
+// Where jobs live. One interface, several engines, one conformance suite (tests/server/jobs).
+//
+// Promise: what create() or commit() reported survives kill -9 and power loss. A job runs at least once; its result
+// becomes visible exactly once, because every write of a worker names its claim (token and fence) and touches nothing
+// when the job was given away, canceled or removed meanwhile.
+// All times are the store's own clock. Every function may be called from any thread.
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/jobs/event.h"
+#include "server/jobs/job.h"
+
+namespace kiln {
+
+using Millis = std::chrono::milliseconds;
+
+struct NewJob {
+  std::string label;
+  JobInputs inputs;
+  std::string recipe;
+  std::string content_key;
+  bool force = false;           // do not answer from an earlier result
+  std::string idempotency_key;  // empty: none
+  std::string request_hash;     // of the whole request; a key met again with another hash is refused
+  int max_queued = 0;           // refuse with "queue_full" when so many wait already; 0: no limit
+};
+
+struct Created {
+  Job job;
+  bool existed = false;  // the idempotency key was known: `job` is the first one
+};
+
+/// The right to write to a running job. Dies when the lease ends or the job is canceled.
+struct ClaimRef {
+  std::string job_id;
+  std::string token;       // 128 random bits, hex
+  std::int64_t fence = 0;  // grows with every claim of the store
+};
+
+struct Claim {
+  ClaimRef ref;
+  Job job;
+};
+
+enum class Beat { ok, lost, cancel_requested };
+enum class Wrote { done, lost };  // lost: fenced off, canceled or gone; nothing was written
+
+struct JobQuery {
+  std::optional<JobState> state;
+  std::optional<std::string> label;
+  int limit = 50;
+  std::string cursor;  // from JobPage::next_cursor; empty for the first page
+};
+
+/// Newest first. Jobs created while paging never shift or repeat an entry.
+struct JobPage {
+  std::vector<Job> jobs;
+  std::string next_cursor;  // empty on the last page
+};
+
+/// A retry: why, and how long the job rests. `crash` counts against the crash limit, else against the retries.
+struct Retry {
+  std::string reason;
+  bool crash = false;
+  Millis delay{0};
+};
+
+struct StoreCounts {
+  std::uint64_t queued = 0, running = 0, succeeded = 0, failed = 0, canceled = 0;
+  std::int64_t oldest_queued_ms = 0;  // creation time; 0 when nothing waits
+};
+
+/// Codes of faults: store_failed, disk_full (the database cannot grow), not_found, bad_cursor, queue_full,
+/// idempotency_mismatch, asset_not_found, poisoned (the same content crashed its worker twice within 24 h),
+/// not_terminal.
+class JobStore {
+ public:
+  virtual ~JobStore() = default;
+
+  /// Stores a job; at once `succeeded` and `cached` when content_key has a result and not `force`.
+  /// Every input must be a known blob (touch_blob).
+  virtual Result<Created> create(const NewJob&) = 0;
+
+  /// The oldest job that is due, now running under a lease; nothing when none is.
+  virtual Result<std::optional<Claim>> claim(Millis lease) = 0;
+  virtual Result<Beat> heartbeat(const ClaimRef&, Millis lease, const std::optional<JobProgress>&) = 0;
+  virtual Result<Wrote> commit(const ClaimRef&, std::span<const Artifact>, bool cached) = 0;
+  virtual Result<Wrote> fail(const ClaimRef&, const JobError&) = 0;
+  virtual Result<Wrote> retry(const ClaimRef&, const Retry&) = 0;
+  /// Back to the queue without losing an attempt (drain).
+  virtual Result<Wrote> release(const ClaimRef&) = 0;
+  /// Ends a running job whose cancellation was asked for, once its worker is gone.
+  virtual Result<Wrote> finish_cancel(const ClaimRef&) = 0;
+
+  /// Requeues (or cancels, when asked for) jobs whose lease ended; with `everything` all running ones. Returns how
+  /// many.
+  virtual Result<int> reap(bool everything = false) = 0;
+
+  /// queued -> canceled at once; running -> flagged; terminal -> unchanged. Returns the job after it.
+  virtual Result<Job> cancel(const std::string& id) = 0;
+  /// Forgets a terminal job and its events. Removing an unknown job is done already.
+  virtual Result<void> remove(const std::string& id) = 0;
+
+  virtual Result<Job> get(const std::string& id) = 0;
+  virtual Result<JobPage> list(const JobQuery&) = 0;
+  /// Artefacts of an earlier success with this key; empty when there is none.
+  virtual Result<std::vector<Artifact>> find_result(const std::string& content_key) = 0;
+  virtual Result<StoreCounts> counts() = 0;
+  /// How long until the next waiting job is due; nothing when no job waits for its time.
+  virtual Result<std::optional<Millis>> next_due() = 0;
+
+  /// Durable events with id > `after`, oldest first; of one job, or of all when `job_id` is empty.
+  virtual Result<std::vector<JobEvent>> events_after(std::uint64_t after, const std::string& job_id, int limit) = 0;
+  virtual Result<std::uint64_t> last_event_id() = 0;
+  virtual Result<void> log(const std::string& job_id, const std::string& line) = 0;
+
+  /// Notes that a blob exists and was just referred to. Call after its file is durable.
+  virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes) = 0;
+  virtual Result<bool> knows_blob(const std::string& sha256) = 0;
+  /// Forgets blobs that nothing refers to and nobody touched for `grace`, and returns them: their files may go now.
+  virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace) = 0;
+
+  /// Writes and reads back one row: ready to serve.
+  virtual Result<void> check_writable() = 0;
+};
+
+}  // namespace kiln
