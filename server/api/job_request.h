@@ -1,0 +1,50 @@
+#pragma once
+// What a user asks for: bodies and queries become typed requests here, or a Problem that names every mistake.
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/bake/recipe.h"
+#include "server/api/problem.h"
+
+namespace kiln {
+
+using QueryParams = std::vector<std::pair<std::string, std::string>>;  // decoded, in order
+
+/// A job document: a recipe, plus `preset` (the recipe's base; members given beside it win) and `force`.
+struct JobRequest {
+  Recipe recipe;
+  std::string recipe_json;  // canonical
+  bool force = false;       // bake even if the same result is known
+};
+
+inline constexpr std::size_t kMaxJobDocument = 1u << 20;  // bytes
+inline constexpr int kMaxJsonDepth = 64;
+
+/// Checks that `json` is one JSON document: UTF-8, no member named twice, nested at most kMaxJsonDepth deep.
+/// Codes  malformed_json (400, with line and column), json_too_deep (422), duplicate_member (422)
+Answer<void> check_json(std::string_view json);
+
+/// Parses a job document. All mistakes at once.
+Answer<JobRequest> parse_job_request(std::string_view json);
+
+/// The job of a raw upload, from its query: preset (required), label, environment, force, quality, seed.
+/// environment is builtin:NAME, r,g,b, or the sha256 of an asset.
+Answer<JobRequest> parse_raw_request(const QueryParams&);
+
+struct JobListRequest {
+  std::vector<std::string> statuses;  // empty: all
+  std::string label;                  // empty: all
+  int limit = 50;                     // 1..200
+  std::string cursor;                 // opaque; empty: from the newest
+};
+
+/// ?status=a,b&label=&limit=&cursor=; an unknown or repeated name is a mistake.
+Answer<JobListRequest> parse_list_request(const QueryParams&);
+
+/// The values of the allowed names, in the order of `allowed`; empty when absent. Unknown and repeated names are mistakes.
+Answer<std::vector<std::string>> take_params(const QueryParams&, const std::vector<std::string>& allowed);
+
+}  // namespace kiln
