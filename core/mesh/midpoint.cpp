@@ -1,0 +1,33 @@
+#include "core/mesh/midpoint.h"
+
+#include <algorithm>
+
+namespace kiln {
+namespace {
+
+Vec2f middle(const Vec2f& a, const Vec2f& b) { return {0.5F * (a.x + b.x), 0.5F * (a.y + b.y)}; }
+
+Vec4f middle(const Vec4f& a, const Vec4f& b) {
+  return {0.5F * (a.x + b.x), 0.5F * (a.y + b.y), 0.5F * (a.z + b.z), 0.5F * (a.w + b.w)};
+}
+
+Vec4f middle_tangent(const Vec4f& a, const Vec4f& b) {
+  const Vec3f along = normalized(Vec3f{a.x + b.x, a.y + b.y, a.z + b.z}, Vec3f{a.x, a.y, a.z});
+  return {along.x, along.y, along.z, a.w};
+}
+
+}  // namespace
+
+std::uint32_t append_midpoint(Mesh& mesh, std::uint32_t first, std::uint32_t second) {
+  const auto [a, b] = std::minmax(first, second);
+  const auto vertex = static_cast<std::uint32_t>(mesh.position.size());
+  mesh.position.push_back(middle(mesh.position[a], mesh.position[b]));
+  mesh.normal.push_back(normalized(mesh.normal[a] + mesh.normal[b], mesh.normal[a]));
+  if (!mesh.uv0.empty()) mesh.uv0.push_back(middle(mesh.uv0[a], mesh.uv0[b]));
+  if (!mesh.uv1.empty()) mesh.uv1.push_back(middle(mesh.uv1[a], mesh.uv1[b]));
+  if (!mesh.color.empty()) mesh.color.push_back(middle(mesh.color[a], mesh.color[b]));
+  if (!mesh.tangent.empty()) mesh.tangent.push_back(middle_tangent(mesh.tangent[a], mesh.tangent[b]));
+  return vertex;
+}
+
+}  // namespace kiln

@@ -1,0 +1,17 @@
+#pragma once
+// The vertex halfway along an edge.
+
+#include <cstdint>
+
+#include "core/mesh/mesh.h"
+
+namespace kiln {
+
+/// The middle of two points, the same bits in either order.
+inline Vec3f middle(const Vec3f& a, const Vec3f& b) { return (a + b) * 0.5F; }
+
+/// Appends the vertex halfway between a and b and returns its index. Every attribute of the mesh is interpolated;
+/// normal and tangent are made unit again (that of the lower index where the two cancel; so is the tangent's sign).
+std::uint32_t append_midpoint(Mesh&, std::uint32_t a, std::uint32_t b);
+
+}  // namespace kiln
