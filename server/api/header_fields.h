@@ -43,8 +43,6 @@ Answer<int> parse_wait(std::string_view value);
 
 /// 1..255 visible ASCII characters.
 bool is_idempotency_key(std::string_view);
-/// 64 lower-case hex digits.
-bool is_sha256(std::string_view);
 /// A decimal number of at most 18 digits and nothing else.
 std::optional<std::uint64_t> parse_decimal(std::string_view);
 

@@ -24,15 +24,15 @@ struct ProgressReply {
   std::string stage;
   std::uint64_t done = 0;  // of total, in units of the stage
   std::uint64_t total = 0;
-  double fraction = 0;            // of the whole job, [0, 1]
-  std::optional<double> eta_s;    // seconds to go, when known
-  std::optional<double> error;    // current estimate of relRMSE, when known
+  double fraction = 0;          // of the whole job, [0, 1]
+  std::optional<double> eta_s;  // seconds to go, when known
+  std::optional<double> error;  // current estimate of relRMSE, when known
 };
 
 struct JobReply {
   std::string id;
   std::string label;
-  std::string status;  // queued | running | succeeded | failed | canceled
+  std::string status;                               // queued | running | succeeded | failed | canceled
   std::string created_at, started_at, finished_at;  // RFC 3339 UTC; empty: not yet (null on the wire)
   int attempt = 0;
   bool cached = false;
@@ -58,9 +58,10 @@ std::string job_json(const JobReply&);
 std::string job_list_json(const JobListReply&);
 std::string artifact_list_json(std::string_view job, const std::vector<ArtifactReply>&);
 
-/// The data of the server-sent events `progress` and `artifact`: the object plus "job".
+/// The data of the server-sent events `progress`, `artifact` and `log`: the object plus "job".
 std::string progress_event_json(std::string_view job, const ProgressReply&);
 std::string artifact_event_json(std::string_view job, const ArtifactReply&);
+std::string log_event_json(std::string_view job, std::string_view line);
 
 /// What a client reads back. Unknown members are ignored, so an old client reads a newer server.
 /// Fails  code `bad_reply` when a member that every job has is missing or of another type.

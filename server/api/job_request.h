@@ -31,20 +31,21 @@ Answer<void> check_json(std::string_view json);
 Answer<JobRequest> parse_job_request(std::string_view json);
 
 /// The job of a raw upload, from its query: preset (required), label, environment, force, quality, seed.
-/// environment is builtin:NAME, r,g,b, or the sha256 of an asset.
+/// environment is the name of a built-in sky, r,g,b, or the sha256 of an asset.
 Answer<JobRequest> parse_raw_request(const QueryParams&);
 
 struct JobListRequest {
-  std::vector<std::string> statuses;  // empty: all
-  std::string label;                  // empty: all
-  int limit = 50;                     // 1..200
-  std::string cursor;                 // opaque; empty: from the newest
+  std::string status;  // empty: all
+  std::string label;   // empty: all
+  int limit = 50;      // 1..200
+  std::string cursor;  // opaque; empty: from the newest
 };
 
-/// ?status=a,b&label=&limit=&cursor=; an unknown or repeated name is a mistake.
+/// ?status=&label=&limit=&cursor=; an unknown or repeated name is a mistake.
 Answer<JobListRequest> parse_list_request(const QueryParams&);
 
-/// The values of the allowed names, in the order of `allowed`; empty when absent. Unknown and repeated names are mistakes.
+/// The values of the allowed names, in the order of `allowed`; empty when absent. Unknown and repeated names are
+/// mistakes.
 Answer<std::vector<std::string>> take_params(const QueryParams&, const std::vector<std::string>& allowed);
 
 }  // namespace kiln
