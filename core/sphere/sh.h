@@ -27,4 +27,8 @@ void rotate_sh(int order, const Basis<float>& basis, const float* in, float* out
 ///   t_lm = A_l / pi * Y_lm(n),   A_l of Ramamoorthi and Hanrahan 2001.   t(n) . L(constant 1) = 1.
 void clamped_cosine_transfer(int order, const Vec3f& n, float* out);
 
+/// Takes ringing out of a projection: band l is scaled by 1 / (1 + lambda l^2 (l+1)^2) (Sloan 2008, "Stupid SH
+/// tricks"). lambda 0 changes nothing; the mean (band 0) never changes.
+void window_sh(int order, float lambda, float* coefficients);
+
 }  // namespace kiln
