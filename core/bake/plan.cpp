@@ -1,0 +1,151 @@
+#include "core/bake/plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/mesh/topology.h"
+#include "core/sphere/sh.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+/// What the three words mean. The tail is the light left out beyond the last bounce, relative to all of it.
+struct Grade {
+  const char* name;
+  int order, samples, bounce_samples, lamp_samples;
+  double tail;
+  std::uint64_t triangles;
+  float threshold;  // of the residual measure; see subdivide.h
+  int bits;
+};
+constexpr std::array<Grade, 3> kGrades = {{
+    {"draft", 4, 256, 64, 36, 0.05, 10'000, 2e-4F, 10},
+    {"standard", 6, 1024, 256, 100, 0.02, 40'000, 5e-5F, 12},
+    {"final", 6, 4096, 1024, 400, 0.005, 160'000, 1e-5F, 14},
+}};
+
+/// Measured on the machine of core/prt/README.md, one thread: million rays a second, and bytes a vertex.
+constexpr double kRaysPerSecond = 8e6;
+constexpr std::uint64_t kBytesPerTriangle = 160;  // mesh, hierarchy and hash tables
+
+bool emits(const Material& material) { return length(material.emission) > 0; }
+
+bool has_lamps(const Scene& scene) {
+  if (!scene.lights.empty()) return true;
+  return std::any_of(scene.parts.begin(), scene.parts.end(),
+                     [&](const Part& part) { return emits(scene.materials[static_cast<std::size_t>(part.material)]); });
+}
+
+std::string text(double x) {
+  std::array<char, 32> out{};
+  std::snprintf(out.data(), out.size(), "%.3g", x);
+  return out.data();
+}
+
+void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
+  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
+}
+
+constexpr const char* kAsked = "asked for by the recipe";
+
+void plan_order(Plan& plan, const PrtStep& step, const Grade& grade) {
+  plan.order = step.order.value_or(grade.order);
+  decide(plan, "order", std::to_string(plan.order),
+         step.order ? kAsked
+                    : std::string("the ") + grade.name + " quality keeps " + std::to_string(plan.order) +
+                          " bands of distant light");
+}
+
+/// The fewest reflections whose tail rho^(b+1) stays below the grade's share: an upper bound, as light also escapes.
+void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Grade& grade) {
+  const double rho = mean_albedo(scene);
+  int bounces = 0;
+  while (bounces < 16 && std::pow(rho, bounces + 1) > grade.tail) ++bounces;
+  std::string reason = "at a mean albedo of " + text(rho) + " reflections beyond carry less than " +
+                       text(100 * grade.tail) + " % of the light";
+  if (rho <= 0) reason = "all surfaces are black: nothing can be lit indirectly";
+  plan.bounces = step.bounces.value_or(bounces);
+  decide(plan, "bounces", std::to_string(plan.bounces), step.bounces ? kAsked : reason);
+}
+
+void plan_samples(Plan& plan, const PrtStep& step, const Grade& grade) {
+  plan.samples = step.samples.value_or(grade.samples);
+  plan.bounce_samples = step.samples ? std::max(16, *step.samples / 4) : grade.bounce_samples;
+  plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : grade.lamp_samples;
+  plan.coefficient_bits = step.coefficient_bits.value_or(grade.bits);
+  decide(plan, "samples", std::to_string(plan.samples),
+         step.samples ? kAsked : std::string("the ") + grade.name + " quality");
+}
+
+void plan_lamps(Plan& plan, const Scene& scene) {
+  plan.lamps = has_lamps(scene);
+  decide(plan, "lamps", plan.lamps ? "baked" : "skipped",
+         plan.lamps ? "the scene has emitters or punctual lights of its own"
+                    : "the scene has neither emitters nor punctual lights");
+}
+
+void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision& asked, const Grade& grade) {
+  using Mode = PrtStep::Subdivision::Mode;
+  const std::uint64_t input = scene.mesh.triangles.size();
+  const std::uint64_t budget = asked.triangles.value_or(std::max(input, grade.triangles));
+  plan.split = asked.mode != Mode::off && budget > input;
+  plan.subdivide = {.measure = asked.measure,
+                    .alpha = asked.alpha,
+                    .threshold = asked.threshold.value_or(grade.threshold),
+                    .triangles = budget,
+                    .max_depth = asked.max_depth};
+  const std::string reason =
+      asked.mode == Mode::off ? std::string("turned off by the recipe")
+      : plan.split
+          ? "the input's " + std::to_string(input) + " triangles are fewer than the budget"
+          : "the input has " + std::to_string(input) + " triangles already, the budget is " + std::to_string(budget);
+  decide(plan, "subdivide", plan.split ? "up to " + std::to_string(budget) + " triangles" : "no", reason);
+}
+
+Prediction predict(const Plan& plan, const Scene& scene, int threads) {
+  Prediction out;
+  const std::uint64_t input_vertices = scene.mesh.position.size(), input = scene.mesh.triangles.size();
+  out.triangles = plan.split ? plan.subdivide.triangles : input;
+  out.vertices = input_vertices + (plan.split ? (out.triangles - input) : 0);
+  const auto slots = static_cast<std::uint64_t>(sh_count(plan.order)) + (plan.lamps ? 1 : 0);
+  out.memory_bytes =
+      out.vertices * (slots * 3 * 4 * 2 + 200) + (out.triangles + input) * kBytesPerTriangle + (64ULL << 20);
+  for (const Image& image : scene.images) out.memory_bytes += image.rgba.size() + image.encoded.size();
+  const std::uint64_t per_vertex =
+      static_cast<std::uint64_t>(plan.samples + (plan.lamps ? plan.lamp_samples : 0)) +
+      static_cast<std::uint64_t>(plan.bounces) * static_cast<std::uint64_t>(plan.bounce_samples);
+  out.rays = out.vertices * per_vertex;
+  out.seconds = static_cast<double>(out.rays) / (kRaysPerSecond * std::max(1, threads)) + 0.2;
+  out.artifact_bytes = out.vertices * (slots * 3 * static_cast<std::uint64_t>(plan.coefficient_bits) / 16 + 8);
+  return out;
+}
+
+}  // namespace
+
+float mean_albedo(const Scene& scene) {
+  double sum = 0, area = 0;
+  for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
+    const double weight = triangle_area(scene.mesh, scene.mesh.triangles[t]);
+    const Vec3f rho = albedo_at(scene, surface_point(scene, t, 1.0F / 3, 1.0F / 3));
+    sum += weight * std::max({rho.x, rho.y, rho.z});
+    area += weight;
+  }
+  return area > 0 ? static_cast<float>(sum / area) : 0.0F;
+}
+
+Plan make_plan(const Scene& scene, const PrtStep& step, Quality quality, int threads) {
+  const Grade& grade = kGrades[static_cast<std::size_t>(quality)];
+  Plan plan;
+  plan_order(plan, step, grade);
+  plan_lamps(plan, scene);
+  plan_bounces(plan, scene, step, grade);
+  plan_samples(plan, step, grade);
+  plan_subdivision(plan, scene, step.subdivide, grade);
+  decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
+  plan.prediction = predict(plan, scene, threads);
+  return plan;
+}
+
+}  // namespace kiln

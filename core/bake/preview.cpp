@@ -1,0 +1,106 @@
+#include "core/bake/preview.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/artifact/evaluate.h"
+#include "core/artifact/look.h"
+#include "core/artifact/png.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+struct Camera {
+  Vec3f eye, forward, right, up;  // right and up scaled to half the picture's extent at distance 1
+};
+
+/// Looks at the middle of the bounding box from a little above, far enough to hold its sphere.
+Camera frame_camera(const Mesh& mesh, const Preview& preview) {
+  Vec3f low{1, 1, 1}, high{-1, -1, -1};
+  for (const Vec3f& p : mesh.position) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  constexpr float kHalfView = 0.32F;  // tangent of half the vertical angle
+  const float radius = std::max(length(high - low) / 2, 1e-3F);
+  const Vec3f back = normalized(Vec3f{0.45F, 0.42F, 0.9F});
+  Camera camera;
+  camera.forward = -back;
+  camera.eye = (low + high) * 0.5F + back * (0.88F * radius / std::sin(std::atan(kHalfView)));
+  camera.right = normalized(cross(camera.forward, {0, 1, 0})) *
+                 (kHalfView * static_cast<float>(preview.width) / static_cast<float>(preview.height));
+  camera.up = normalized(cross(camera.right, camera.forward)) * kHalfView;
+  return camera;
+}
+
+/// The first face that looks at the camera, passing through those that look away.
+Hit first_facing(const Tracer& tracer, Vec3f origin, const Vec3f& direction) {
+  for (int layer = 0; layer < 16; ++layer) {
+    const Hit hit = tracer.closest(origin, direction, std::numeric_limits<float>::infinity());
+    if (!hit || !hit.back) return hit;
+    const SurfacePoint place = surface_point(tracer.scene(), hit.triangle, hit.u, hit.v);
+    origin = offset_origin(place.position, place.geometric_normal);
+    if (dot(place.geometric_normal, direction) < 0) origin = offset_origin(place.position, -place.geometric_normal);
+  }
+  return {};
+}
+
+struct Painter {
+  const BakedScene& baked;
+  const Tracer& tracer;
+  std::vector<Vec3f> value;
+
+  Vec3f background(float height) const {
+    const float t = std::clamp(height, 0.0F, 1.0F);
+    return Vec3f{0.055F, 0.06F, 0.07F} * (1 - t) + Vec3f{0.16F, 0.17F, 0.19F} * t;
+  }
+
+  Vec3f color(const Vec3f& eye, const Vec3f& direction, float height) const {
+    const Hit hit = first_facing(tracer, eye, direction);
+    if (!hit) return background(height);
+    const Scene& scene = tracer.scene();
+    const SurfacePoint place = surface_point(scene, hit.triangle, hit.u, hit.v);
+    const Triangle& t = scene.mesh.triangles[hit.triangle];
+    const Vec3f light = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
+    return tone_map((light * albedo_at(scene, place) + emission_at(scene, place)) * baked.exposure);
+  }
+};
+
+std::uint8_t srgb_byte(float x) {
+  const float s = x <= 0.0031308F ? 12.92F * x : 1.055F * std::pow(x, 1 / 2.4F) - 0.055F;
+  return static_cast<std::uint8_t>(std::lround(std::clamp(s, 0.0F, 1.0F) * 255));
+}
+
+}  // namespace
+
+Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview& preview,
+                             Threads& threads) {
+  const Camera camera = frame_camera(decoded.scene.mesh, preview);
+  const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients)};
+  const auto width = static_cast<std::size_t>(preview.width), height = static_cast<std::size_t>(preview.height);
+  Bytes pixels(width * height * 3);
+  threads.for_blocks(height, 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y) {
+      for (std::size_t x = 0; x < width; ++x) {
+        Vec3f sum;
+        for (int s = 0; s < preview.grid * preview.grid; ++s) {
+          const float dx = (static_cast<float>(s % preview.grid) + 0.5F) / static_cast<float>(preview.grid);
+          const float dy = (static_cast<float>(s / preview.grid) + 0.5F) / static_cast<float>(preview.grid);
+          const float px = (static_cast<float>(x) + dx) / static_cast<float>(width) * 2 - 1;
+          const float py = 1 - (static_cast<float>(y) + dy) / static_cast<float>(height) * 2;
+          const Vec3f direction = normalized(camera.forward + camera.right * px + camera.up * py);
+          sum += painter.color(camera.eye, direction, (py + 1) / 2);
+        }
+        sum *= 1.0F / static_cast<float>(preview.grid * preview.grid);
+        for (std::size_t c = 0; c < 3; ++c) pixels[(y * width + x) * 3 + c] = srgb_byte(sum[c]);
+      }
+    }
+  });
+  return write_png({preview.width, preview.height, 3}, pixels);
+}
+
+}  // namespace kiln

@@ -1,0 +1,126 @@
+#include "core/bake/report.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/bake/bake.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json plan_list(const Plan& plan) {
+  ordered_json list = ordered_json::array();
+  for (const Decision& d : plan.decisions)
+    list.push_back({{"decision", d.decision}, {"value", d.value}, {"reason", d.reason}});
+  return list;
+}
+
+ordered_json warning_list(const Scene& scene) {
+  ordered_json list = ordered_json::array();
+  for (const Warning& w : scene.warnings)
+    list.push_back({{"code", w.code}, {"message", w.message}, {"where", w.where}});
+  return list;
+}
+
+ordered_json scene_object(const ReportInput& in) {
+  return {{"triangles", in.input_triangles},      {"vertices", in.input_vertices},
+          {"parts", in.input.parts.size()},       {"materials", in.input.materials.size()},
+          {"textures", in.input.textures.size()}, {"lights", in.input.lights.size()},
+          {"world_size", in.input.frame.scale}};
+}
+
+ordered_json stage_list(const BakeLog& log) {
+  ordered_json list = ordered_json::array();
+  for (const StageRecord& s : log.stages())
+    list.push_back({{"name", s.name}, {"seconds", s.seconds}, {"rays", s.rays}});
+  return list;
+}
+
+ordered_json result_object(const ReportInput& in) {
+  const auto vertices = std::max<std::uint64_t>(in.result.position.size(), 1);
+  ordered_json streams = ordered_json::array();
+  for (const auto& [name, bytes] : in.streams) streams.push_back({{"name", name}, {"bytes", bytes}});
+  return {{"triangles", in.result.triangles.size()},
+          {"vertices", in.result.position.size()},
+          {"bytes", in.result_bytes},
+          {"bytes_per_vertex", static_cast<double>(in.result_bytes) / static_cast<double>(vertices)},
+          {"streams", streams}};
+}
+
+ordered_json error_object(const ErrorStats& e) {
+  return {{"relrmse", e.relrmse},
+          {"interval", {e.interval_low, e.interval_high}},
+          {"relrmse_without_worst_1pct", e.relrmse_without_worst_1pct},
+          {"p99", e.p99},
+          {"max", e.max},
+          {"bias", e.bias},
+          {"reference_noise", e.noise}};
+}
+
+ordered_json certificate_object(const std::optional<Certificate>& certificate) {
+  if (!certificate) return nullptr;
+  ordered_json out = error_object(certificate->transport);
+  out["points"] = certificate->points;
+  out["samples"] = certificate->samples;
+  out["lightings"] = ordered_json::array();
+  for (std::size_t i = 0; i < certificate->lightings.size() && i < certificate->transport.by_lighting.size(); ++i) {
+    out["lightings"].push_back(
+        {{"name", certificate->lightings[i]}, {"relrmse", certificate->transport.by_lighting[i]}});
+  }
+  if (certificate->truncation) out["truncation"] = error_object(*certificate->truncation);
+  out["seconds"] = certificate->seconds;
+  return out;
+}
+
+ordered_json parameters_object(const Plan& plan) {
+  constexpr const char* kMeasures[] = {"residual", "eq2", "eq3", "eq4"};
+  return {{"order", plan.order},
+          {"bounces", plan.bounces},
+          {"samples", plan.samples},
+          {"bounce_samples", plan.bounce_samples},
+          {"lamp_samples", plan.lamp_samples},
+          {"triangles", plan.subdivide.triangles},
+          {"measure", kMeasures[static_cast<int>(plan.subdivide.measure)]},
+          {"threshold", plan.subdivide.threshold},
+          {"max_depth", plan.subdivide.max_depth},
+          {"coefficient_bits", plan.coefficient_bits}};
+}
+
+std::string text_of(const ordered_json& json) {
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+std::string report_json(const ReportInput& in) {
+  return text_of({{"engine", std::string("kiln ") + kEngineVersion},
+                  {"scene", scene_object(in)},
+                  {"plan", plan_list(in.plan)},
+                  {"parameters", parameters_object(in.plan)},
+                  {"recipe", ordered_json::parse(recipe_json(in.recipe))},
+                  {"stages", stage_list(in.log)},
+                  {"seconds", in.log.seconds()},
+                  {"rays", in.log.rays()},
+                  {"peak_memory_bytes", peak_memory_bytes()},
+                  {"result", result_object(in)},
+                  {"warnings", warning_list(in.input)},
+                  {"certificate", certificate_object(in.certificate)}});
+}
+
+std::string plan_report_json(const Plan& plan, const Scene& scene) {
+  const Prediction& p = plan.prediction;
+  return text_of({{"plan", plan_list(plan)},
+                  {"parameters", parameters_object(plan)},
+                  {"prediction",
+                   {{"triangles", p.triangles},
+                    {"vertices", p.vertices},
+                    {"rays", p.rays},
+                    {"seconds", p.seconds},
+                    {"memory_bytes", p.memory_bytes},
+                    {"artifact_bytes", p.artifact_bytes}}},
+                  {"warnings", warning_list(scene)}});
+}
+
+}  // namespace kiln

@@ -1,0 +1,32 @@
+#pragma once
+// report.json: what was planned, done, reached and what it cost. Fields are listed in core/bake/README.md.
+
+#include <optional>
+#include <string>
+
+#include "core/bake/bake_log.h"
+#include "core/bake/certificate.h"
+#include "core/bake/plan.h"
+#include "core/prt/direct_transfer.h"
+
+namespace kiln {
+
+/// Everything a report is made from.
+struct ReportInput {
+  const Scene& input;  // counts of the scene as it came
+  std::uint64_t input_vertices = 0, input_triangles = 0;
+  const Plan& plan;
+  const Recipe& recipe;
+  const BakeLog& log;
+  const Mesh& result;  // as delivered
+  std::uint64_t result_bytes = 0;
+  std::vector<std::pair<std::string, std::uint64_t>> streams;  // bytes of each attribute stream
+  const std::optional<Certificate>& certificate;
+};
+
+std::string report_json(const ReportInput&);
+
+/// The plan alone, for POST /v1/plan and `kiln plan`.
+std::string plan_report_json(const Plan&, const Scene&);
+
+}  // namespace kiln

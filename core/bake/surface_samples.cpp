@@ -1,0 +1,30 @@
+#include "core/bake/surface_samples.h"
+
+#include <algorithm>
+
+#include "core/base/random.h"
+#include "core/mesh/topology.h"
+#include "core/sphere/sampling.h"
+
+namespace kiln {
+
+std::vector<SurfaceSample> sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
+  std::vector<double> sum;
+  sum.reserve(mesh.triangles.size());
+  double total = 0;
+  for (const Triangle& t : mesh.triangles) sum.push_back(total += triangle_area(mesh, t));
+  std::vector<SurfaceSample> samples;
+  if (!(total > 0)) return samples;
+  samples.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    Random random(seed, i);
+    const double place = (static_cast<double>(i) + random.uniform_double()) / static_cast<double>(count) * total;
+    const auto found = std::upper_bound(sum.begin(), sum.end(), place);
+    const auto triangle = std::min<std::size_t>(static_cast<std::size_t>(found - sum.begin()), sum.size() - 1);
+    const Vec2<double> uv = uniform_triangle({random.uniform_double(), random.uniform_double()});
+    samples.push_back({static_cast<std::uint32_t>(triangle), static_cast<float>(uv.x), static_cast<float>(uv.y)});
+  }
+  return samples;
+}
+
+}  // namespace kiln

@@ -1,0 +1,20 @@
+#pragma once
+// Random points on a surface, uniform by area: where errors are measured, never at the vertices themselves.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/mesh/mesh.h"
+
+namespace kiln {
+
+struct SurfaceSample {
+  std::uint32_t triangle = 0;
+  float u = 0, v = 0;  // barycentrics of corners 1 and 2
+};
+
+/// `count` independent points; stratified over the running sum of areas, so that every large triangle is met.
+/// Empty when the mesh has no area.   Repeat  a function of mesh, count and seed.
+std::vector<SurfaceSample> sample_surface(const Mesh&, std::size_t count, std::uint64_t seed);
+
+}  // namespace kiln

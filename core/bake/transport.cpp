@@ -1,0 +1,125 @@
+#include "core/bake/transport.h"
+
+#include <algorithm>
+#include <span>
+
+#include "core/prt/direct_transfer.h"
+#include "core/prt/interreflection.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+namespace {
+
+/// Direct light of both kinds at points. Lamps ride along as three more columns, scaled so that a typical lamp value
+/// weighs as much in the split measure as the constant band of an open point.
+class DirectSource {
+ public:
+  DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, Threads& threads)
+      : tracer_(tracer), plan_(plan), seed_(seed), threads_(threads) {}
+
+  int width() const { return sh_count(plan_.order) + (plan_.lamps ? 3 : 0); }
+
+  std::vector<float> operator()(std::span<const TransferPoint> batch) {
+    points += batch.size();
+    std::vector<float> sky = bake_direct_transfer(
+        tracer_, batch, {.order = plan_.order, .samples = plan_.samples, .seed = seed_}, threads_, &stats);
+    if (!plan_.lamps) return sky;
+    const std::vector<Vec3f> lamps =
+        bake_fixed_direct(tracer_, batch, {.samples = plan_.lamp_samples, .seed = seed_}, threads_, &stats);
+    if (lamp_scale_ == 0) lamp_scale_ = measure_lamp_scale(lamps);
+    return join(sky, lamps);
+  }
+
+  /// Takes the joined columns apart again.
+  void separate(const std::vector<float>& joined, std::vector<float>& sky, std::vector<Vec3f>& lamps) const {
+    const auto n = static_cast<std::size_t>(sh_count(plan_.order)), stride = static_cast<std::size_t>(width());
+    const std::size_t points = joined.size() / stride;
+    sky.resize(points * n);
+    lamps.resize(plan_.lamps ? points : 0);
+    for (std::size_t p = 0; p < points; ++p) {
+      const float* row = joined.data() + p * stride;
+      std::copy_n(row, n, sky.data() + p * n);
+      if (plan_.lamps) lamps[p] = Vec3f{row[n], row[n + 1], row[n + 2]} / lamp_scale_;
+    }
+  }
+
+  TransferStats stats;
+  std::uint64_t points = 0;  // asked for so far
+
+ private:
+  static constexpr float kOpenConstantBand = 0.2820948F;  // t_0 of an unoccluded point: Y(0,0)
+
+  static float measure_lamp_scale(const std::vector<Vec3f>& lamps) {
+    double sum = 0;
+    for (const Vec3f& x : lamps) sum += x.x + x.y + x.z;
+    const double mean = lamps.empty() ? 0 : sum / (3.0 * static_cast<double>(lamps.size()));
+    return mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
+  }
+
+  std::vector<float> join(const std::vector<float>& sky, const std::vector<Vec3f>& lamps) const {
+    const auto n = static_cast<std::size_t>(sh_count(plan_.order)), stride = static_cast<std::size_t>(width());
+    std::vector<float> joined(lamps.size() * stride);
+    for (std::size_t p = 0; p < lamps.size(); ++p) {
+      float* row = joined.data() + p * stride;
+      std::copy_n(sky.data() + p * n, n, row);
+      for (std::size_t c = 0; c < 3; ++c) row[n + c] = lamps[p][c] * lamp_scale_;
+    }
+    return joined;
+  }
+
+  const Tracer& tracer_;
+  const Plan& plan_;
+  std::uint64_t seed_;
+  Threads& threads_;
+  float lamp_scale_ = 0;
+};
+
+/// The mesh to light and the joined columns of direct light at its vertices.
+struct Direct {
+  Mesh mesh;
+  std::vector<float> columns;
+};
+
+Direct bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
+  if (!plan.split) return {mesh, source(vertex_points(mesh))};
+  Subdivided refined = subdivide(mesh, source.width(), std::ref(source), plan.subdivide, threads);
+  return {std::move(refined.mesh), std::move(refined.values)};
+}
+
+void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
+  if (plan.bounces == 0 || source.stats.open_points < source.points) return;
+  plan.bounces = 0;
+  for (Decision& d : plan.decisions) {
+    if (d.decision == "bounces")
+      d = {"bounces", "0", "no surface rises above any other: nothing can be lit indirectly"};
+  }
+}
+
+}  // namespace
+
+Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads) {
+  std::vector<float> sky;
+  std::vector<Vec3f> lamps;
+  log.begin("transfer", 0.55);
+  Mesh refined = [&] {
+    const Tracer tracer(scene, threads);
+    DirectSource source(tracer, plan, seed, threads);
+    Direct direct = bake_direct(scene.mesh, plan, source, threads);
+    source.separate(direct.columns, sky, lamps);
+    log.count_rays(source.stats.rays);
+    skip_bounces_of_open_scene(plan, source);
+    return std::move(direct.mesh);
+  }();
+  scene.mesh = std::move(refined);
+
+  log.begin("bounces", 0.85);
+  const Tracer tracer(scene, threads);
+  TransferStats stats;
+  Transfer transfer = bake_interreflection(
+      tracer, scene.mesh, std::move(sky), std::move(lamps),
+      {.order = plan.order, .bounces = plan.bounces, .samples = plan.bounce_samples, .seed = seed}, threads, &stats);
+  log.count_rays(stats.rays);
+  return transfer;
+}
+
+}  // namespace kiln
