@@ -19,8 +19,8 @@ namespace kiln {
 
 struct Interreflection {
   int order = 6;
-  int bounces = 1;           // passes, >= 0
-  int samples = 256;         // closest-hit rays per vertex and pass
+  int bounces = 1;    // passes, >= 0
+  int samples = 256;  // closest-hit rays per vertex and pass
   std::uint64_t seed = 0;
 };
 
@@ -33,7 +33,7 @@ Transfer bake_interreflection(const Tracer&, const Mesh& mesh, std::vector<float
 
 /// Direct light of emitters and punctual lights at points: irradiance / pi, RGB.
 struct FixedDirect {
-  int samples = 256;         // shadow rays per point over all emitters; one per punctual light besides
+  int samples = 256;  // shadow rays per point over all emitters; one per punctual light besides
   std::uint64_t seed = 0;
 };
 std::vector<Vec3f> bake_fixed_direct(const Tracer&, std::span<const TransferPoint>, const FixedDirect&, Threads&,

@@ -9,25 +9,27 @@
 
 #include "core/base/threads.h"
 #include "core/mesh/mesh.h"
-#include "core/prt/direct_transfer.h"
+#include "core/prt/transfer_point.h"
 
 namespace kiln {
+
+inline constexpr int kMaxSplitDepth = 16;
 
 enum class SplitMeasure { residual, eq2, eq3, eq4 };
 
 struct Subdivide {
   SplitMeasure measure = SplitMeasure::residual;
-  float alpha = 1;                 // eq. 4: weight of normal divergence, per radian
-  float threshold = 0;             // split while the measure is above; unit of the measure
-  std::uint64_t triangles = 0;     // budget of the final mesh; 0: the input's count (no split)
-  int max_depth = 8;               // 1:4 splits of one input triangle
+  float alpha = 1;              // eq. 4: weight of normal divergence, per radian
+  float threshold = 0;          // split while the measure is above; unit of the measure
+  std::uint64_t triangles = 0;  // budget of the final mesh; 0: the input's count (no split)
+  int max_depth = 8;            // 1:4 splits of one input triangle, 0..kMaxSplitDepth
 };
 
 struct Subdivided {
-  Mesh mesh;                       // no T-vertex, no crack; part ids kept; all attributes interpolated
-  std::vector<float> values;       // values[v * width + i] for its vertices
-  std::vector<std::uint8_t> depth; // of each triangle: how often its input triangle was split
-  std::uint64_t evaluated = 0;     // points at which the source was called; each point once
+  Mesh mesh;                        // no T-vertex, no crack; part ids kept; all attributes interpolated
+  std::vector<float> values;        // values[v * width + i] for its vertices
+  std::vector<std::uint8_t> depth;  // of each triangle: how often its input triangle was split
+  std::uint64_t evaluated = 0;      // points at which the source was called; each point once
 };
 
 /// Evaluates `width` numbers (a transfer vector, and the fixed light) at each point; called with large batches.

@@ -9,7 +9,8 @@
 namespace kiln {
 
 /// A linear map from lighting to the radiance that leaves a white point, for each vertex:
-///   value[c](v) = sum_i at(v, c)[i] * L_i[c]  (+ at(v, c)[sh_count(order)] where `fixed`: light of the scene's own lamps)
+///   value[c](v) = sum_i at(v, c)[i] * L_i[c]  (+ at(v, c)[sh_count(order)] where `fixed`: light of the scene's own
+///   lamps)
 /// Shape   coefficients[(v * channels + c) * slots + i];  slots = order^2 + (fixed ? 1 : 0)
 struct Transfer {
   int order = 0;
