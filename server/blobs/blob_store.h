@@ -36,6 +36,7 @@ class BlobReader {
   Result<std::size_t> read(std::uint64_t offset, std::span<std::uint8_t> out) const;
 
  private:
+  friend class BlobStore;
   FileLayer* files_;
   int fd_;
   std::uint64_t size_;
@@ -92,8 +93,10 @@ class BlobStore {
   Result<void> remove(const std::string& sha256);
   void for_each(const std::function<void(const std::string& sha256, std::uint64_t bytes)>&) const;
 
-  /// Removes temporary files: all but partial uploads younger than `partial_age_s`. Returns how many.
-  int clean_tmp(double partial_age_s);
+  /// Removes the files of anonymous writers. Only at start: afterwards they may be alive. Returns how many went.
+  int remove_dead_writers();
+  /// Removes named uploads that nobody writes and that are older than `age_s`. Returns how many went.
+  int expire_partials(double age_s);
 
  private:
   friend class BlobWriter;
@@ -101,6 +104,7 @@ class BlobStore {
   BlobStore(std::filesystem::path root, FileLayer& files);
   Result<StoredBlob> publish(const std::filesystem::path& tmp, const std::string& sha256, std::uint64_t bytes);
   void release_name(const std::string& sha256);
+  int remove_tmp(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
   std::filesystem::path root_;
   FileLayer* files_;
   std::unique_ptr<State> state_;

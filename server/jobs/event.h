@@ -14,6 +14,7 @@ namespace kiln {
 enum class EventKind { state, progress, log, artifact, done };
 
 std::string_view to_string(EventKind);
+std::optional<EventKind> parse_event_kind(std::string_view);
 
 struct JobEvent {
   std::uint64_t id = 0;  // 0 for progress, which is not replayed: write no `id:` line for it

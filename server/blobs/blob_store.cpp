@@ -1,0 +1,315 @@
+#include "server/blobs/blob_store.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <mutex>
+#include <set>
+#include <string_view>
+#include <utility>
+
+namespace kiln {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPiece = 256 * 1024;
+constexpr std::string_view kPartial = "part.";  // tmp/part.<sha256>: a named upload that may be resumed
+
+bool is_partial(const fs::directory_entry& entry) { return entry.path().filename().string().starts_with(kPartial); }
+
+tl::unexpected<Fault> io_fault(int error, const char* doing) {
+  if (error == ENOSPC || error == EDQUOT) return fault("disk_full", "the disk of the server is full");
+  return fault("io_failed", std::string("the server could not ") + doing + " (errno " + std::to_string(error) + ")");
+}
+
+/// A system call again while signals interrupt it.
+template <class Call>
+auto retry_interrupted(Call&& call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
+std::string random_name() {
+  static std::atomic<std::uint64_t> count{0};
+  const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
+  return std::to_string(::getpid()) + "." + std::to_string(now) + "." + std::to_string(count++);
+}
+
+Result<void> sync_folder(FileLayer& files, const fs::path& folder) {
+  const int fd = retry_interrupted([&] { return files.open(folder, O_RDONLY | O_DIRECTORY); });
+  if (fd < 0) return io_fault(errno, "open a folder of its store");
+  const int synced = files.fsync(fd);
+  const int error = errno;
+  files.close(fd);
+  if (synced != 0) return io_fault(error, "sync a folder of its store");
+  return {};
+}
+
+/// Feeds the file to `take` piece by piece.
+Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::span<const std::uint8_t>)>& take) {
+  std::vector<std::uint8_t> piece(kPiece);
+  for (std::int64_t offset = 0;;) {
+    const ssize_t got = retry_interrupted([&] { return files.pread(fd, piece.data(), piece.size(), offset); });
+    if (got < 0) return io_fault(errno, "read a file of its store");
+    if (got == 0) return {};
+    take({piece.data(), static_cast<std::size_t>(got)});
+    offset += got;
+  }
+}
+
+}  // namespace
+
+bool is_sha256(const std::string& text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+BlobReader::BlobReader(BlobReader&& other) noexcept
+    : files_(other.files_), fd_(std::exchange(other.fd_, -1)), size_(other.size_) {}
+
+BlobReader& BlobReader::operator=(BlobReader&& other) noexcept {
+  std::swap(files_, other.files_);
+  std::swap(fd_, other.fd_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+BlobReader::~BlobReader() {
+  if (fd_ >= 0) files_->close(fd_);
+}
+
+Result<std::size_t> BlobReader::read(std::uint64_t offset, std::span<std::uint8_t> out) const {
+  std::size_t filled = 0;
+  while (filled < out.size()) {
+    const auto at = static_cast<std::int64_t>(offset + filled);
+    const ssize_t got =
+        retry_interrupted([&] { return files_->pread(fd_, out.data() + filled, out.size() - filled, at); });
+    if (got < 0) return io_fault(errno, "read a blob");
+    if (got == 0) break;
+    filled += static_cast<std::size_t>(got);
+  }
+  return filled;
+}
+
+struct BlobStore::State {
+  std::mutex mutex;
+  std::set<std::string> uploading;  // names with a writer
+};
+
+BlobWriter::BlobWriter(BlobStore& store, fs::path tmp, int fd, std::string expected)
+    : store_(&store), tmp_(std::move(tmp)), fd_(fd), expected_(std::move(expected)) {}
+
+BlobWriter::BlobWriter(BlobWriter&& other) noexcept
+    : store_(other.store_),
+      tmp_(std::move(other.tmp_)),
+      fd_(std::exchange(other.fd_, -1)),
+      expected_(std::move(other.expected_)),
+      hash_(std::move(other.hash_)),
+      bytes_(other.bytes_) {}
+
+BlobWriter::~BlobWriter() {
+  if (fd_ < 0) return;
+  if (expected_.empty()) {
+    discard();
+  } else {  // kept: the rest may still come
+    store_->files_->close(fd_);
+    store_->release_name(expected_);
+  }
+}
+
+void BlobWriter::discard() {
+  store_->files_->close(std::exchange(fd_, -1));
+  store_->files_->unlink(tmp_);
+  if (!expected_.empty()) store_->release_name(expected_);
+}
+
+Result<void> BlobWriter::write(std::span<const std::uint8_t> bytes) {
+  if (fd_ < 0) return fault("io_failed", "this upload failed before");
+  std::size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t put =
+        retry_interrupted([&] { return store_->files_->write(fd_, bytes.data() + written, bytes.size() - written); });
+    if (put < 0) {
+      auto failed = io_fault(errno, "write a blob");
+      discard();
+      return failed;
+    }
+    hash_.update(bytes.subspan(written, static_cast<std::size_t>(put)));
+    written += static_cast<std::size_t>(put);
+    bytes_ += static_cast<std::uint64_t>(put);
+  }
+  return {};
+}
+
+Result<StoredBlob> BlobWriter::finish() {
+  if (fd_ < 0) return fault("io_failed", "this upload failed before");
+  const std::string sha256 = hash_.hex();
+  if (!expected_.empty() && sha256 != expected_) {
+    discard();
+    return fault("hash_mismatch", "the bytes hash to " + sha256 + ", not to the name they were sent under", expected_);
+  }
+  if (store_->files_->fsync(fd_) != 0) {
+    auto failed = io_fault(errno, "make a blob durable");
+    discard();
+    return failed;
+  }
+  const int closed = store_->files_->close(std::exchange(fd_, -1));
+  auto stored = closed == 0 ? store_->publish(tmp_, sha256, bytes_) : io_fault(errno, "close a blob");
+  if (!stored) store_->files_->unlink(tmp_);
+  if (!expected_.empty()) store_->release_name(expected_);
+  return stored;
+}
+
+BlobStore::BlobStore(fs::path root, FileLayer& files)
+    : root_(std::move(root)), files_(&files), state_(std::make_unique<State>()) {}
+BlobStore::~BlobStore() = default;
+
+Result<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& root, FileLayer& files) {
+  for (const char* folder : {"", "cas", "tmp"}) {
+    const fs::path path = root / folder;
+    if (files.mkdir(path, 0700) != 0 && errno != EEXIST) return io_fault(errno, "make a folder of its store");
+  }
+  if (auto synced = sync_folder(files, root); !synced) return tl::make_unexpected(synced.error());
+  return std::unique_ptr<BlobStore>(new BlobStore(root, files));
+}
+
+fs::path BlobStore::path_of(const std::string& sha256) const { return root_ / "cas" / sha256.substr(0, 2) / sha256; }
+
+Result<BlobWriter> BlobStore::write() {
+  fs::path tmp = root_ / "tmp" / ("new." + random_name());
+  const int fd = files_->open(tmp, O_WRONLY | O_CREAT | O_EXCL, 0600);
+  if (fd < 0) return io_fault(errno, "begin a blob");
+  return BlobWriter(*this, std::move(tmp), fd, "");
+}
+
+std::uint64_t BlobStore::partial_bytes(const std::string& sha256) const {
+  std::error_code none;
+  const auto size = is_sha256(sha256) ? fs::file_size(root_ / "tmp" / (std::string(kPartial) + sha256), none) : 0;
+  return none ? 0 : size;
+}
+
+Result<BlobWriter> BlobStore::write_named(const std::string& sha256, std::uint64_t offset) {
+  if (!is_sha256(sha256))
+    return fault("hash_mismatch", "the name of an asset is its SHA-256 as 64 lower-case hex digits");
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (!state_->uploading.insert(sha256).second)
+      return fault("upload_busy", "another upload of this asset is running");
+  }
+  fs::path tmp = root_ / "tmp" / (std::string(kPartial) + sha256);
+  if (offset != 0 && offset != partial_bytes(sha256)) {
+    release_name(sha256);
+    return fault("offset_mismatch", "the upload goes on at byte " + std::to_string(partial_bytes(sha256)), sha256);
+  }
+  if (offset == 0) files_->unlink(tmp);
+  const int fd = files_->open(tmp, offset == 0 ? O_RDWR | O_CREAT | O_EXCL : O_RDWR | O_APPEND, 0600);
+  if (fd < 0) {
+    auto failed = io_fault(errno, "begin a blob");
+    release_name(sha256);
+    return failed;
+  }
+  BlobWriter writer(*this, std::move(tmp), fd, sha256);
+  if (offset != 0) {
+    auto hashed = read_all(*files_, fd, [&](std::span<const std::uint8_t> bytes) { writer.hash_.update(bytes); });
+    if (!hashed) return tl::make_unexpected(hashed.error());
+    writer.bytes_ = offset;
+  }
+  return writer;
+}
+
+void BlobStore::release_name(const std::string& sha256) {
+  const std::lock_guard lock(state_->mutex);
+  state_->uploading.erase(sha256);
+}
+
+Result<StoredBlob> BlobStore::publish(const fs::path& tmp, const std::string& sha256, std::uint64_t bytes) {
+  const fs::path target = path_of(sha256);
+  const bool new_folder = files_->mkdir(target.parent_path(), 0700) == 0;
+  if (!new_folder && errno != EEXIST) return io_fault(errno, "make a folder of its store");
+  const bool existed = exists(sha256);
+  if (files_->rename(tmp, target) != 0) return io_fault(errno, "name a blob");
+  if (auto synced = sync_folder(*files_, target.parent_path()); !synced) return tl::make_unexpected(synced.error());
+  if (new_folder) {
+    if (auto synced = sync_folder(*files_, root_ / "cas"); !synced) return tl::make_unexpected(synced.error());
+  }
+  return StoredBlob{sha256, bytes, existed};
+}
+
+Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
+  const int fd = files_->open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  if (fd < 0) return io_fault(errno, "open a result");
+  struct stat status {};
+  const bool regular = ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
+  Sha256 hash;
+  std::uint64_t bytes = 0;
+  Result<void> done = regular ? read_all(*files_, fd,
+                                         [&](std::span<const std::uint8_t> piece) {
+                                           hash.update(piece);
+                                           bytes += piece.size();
+                                         })
+                              : Result<void>(fault("io_failed", "a result is not a regular file"));
+  if (done && files_->fsync(fd) != 0) done = io_fault(errno, "make a result durable");
+  files_->close(fd);
+  if (!done) return tl::make_unexpected(done.error());
+  return publish(file, hash.hex(), bytes);
+}
+
+Result<BlobReader> BlobStore::open_blob(const std::string& sha256) const {
+  if (!is_sha256(sha256)) return fault("not_found", "there is no such blob");
+  const int fd = retry_interrupted([&] { return files_->open(path_of(sha256), O_RDONLY); });
+  if (fd < 0 && errno == ENOENT) return fault("not_found", "there is no such blob");
+  if (fd < 0) return io_fault(errno, "open a blob");
+  BlobReader reader(*files_, fd, 0);
+  struct stat status {};
+  if (::fstat(fd, &status) != 0) return io_fault(errno, "examine a blob");
+  return BlobReader(*files_, std::exchange(reader.fd_, -1), static_cast<std::uint64_t>(status.st_size));
+}
+
+bool BlobStore::exists(const std::string& sha256) const {
+  std::error_code none;
+  return is_sha256(sha256) && fs::is_regular_file(path_of(sha256), none);
+}
+
+Result<void> BlobStore::remove(const std::string& sha256) {
+  if (!is_sha256(sha256) || files_->unlink(path_of(sha256)) == 0 || errno == ENOENT) return {};
+  return io_fault(errno, "remove a blob");
+}
+
+void BlobStore::for_each(const std::function<void(const std::string&, std::uint64_t)>& visit) const {
+  std::error_code none;
+  for (const auto& entry : fs::recursive_directory_iterator(root_ / "cas", none)) {
+    const std::string name = entry.path().filename();
+    if (entry.is_regular_file(none) && is_sha256(name)) visit(name, entry.file_size(none));
+  }
+}
+
+int BlobStore::remove_dead_writers() {
+  return remove_tmp([](const fs::directory_entry& entry) { return !is_partial(entry); });
+}
+
+int BlobStore::expire_partials(double age_s) {
+  const std::lock_guard lock(state_->mutex);
+  return remove_tmp([&](const fs::directory_entry& entry) {
+    std::error_code none;
+    const std::chrono::duration<double> age = fs::file_time_type::clock::now() - entry.last_write_time(none);
+    const std::string name = entry.path().filename();
+    return is_partial(entry) && age.count() >= age_s && !state_->uploading.contains(name.substr(kPartial.size()));
+  });
+}
+
+int BlobStore::remove_tmp(const std::function<bool(const fs::directory_entry&)>& chosen) {
+  std::error_code none;
+  int removed = 0;
+  for (const auto& entry : fs::directory_iterator(root_ / "tmp", none)) {
+    if (chosen(entry) && files_->unlink(entry.path()) == 0) ++removed;
+  }
+  return removed;
+}
+
+}  // namespace kiln

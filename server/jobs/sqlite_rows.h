@@ -1,0 +1,40 @@
+#pragma once
+// Between rows and the plain structs. Internal to server/jobs.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/jobs/event.h"
+#include "server/jobs/job_store.h"
+#include "server/jobs/sqlite_db.h"
+
+namespace kiln::sql {
+
+/// SELECT list of a job; read_job() expects these columns in this order.
+extern const char* const kJobColumns;
+
+/// The current row as a job, without its inputs and artefacts.
+Job read_job(const Rows&);
+
+/// Inputs and artefacts of a job that read_job() began.
+Result<void> read_lists(Database&, Job&);
+
+/// One job with everything; nothing when there is none.
+Result<std::optional<Job>> find_job(Database&, const std::string& id);
+
+Result<void> insert_inputs(Database&, const Job&);
+Result<void> insert_artifacts(Database&, const std::string& job_id, std::span<const Artifact>, std::int64_t fence);
+Result<std::vector<Artifact>> find_artifacts(Database&, const std::string& job_id);
+
+struct NewEvent {
+  std::string job_id;
+  EventKind kind = EventKind::state;
+  JobState state = JobState::queued;
+  std::string message;
+};
+/// Appends an event and makes it the job's version.
+Result<std::uint64_t> append_event(Database&, const NewEvent&, std::int64_t now_ms);
+
+}  // namespace kiln::sql

@@ -1,0 +1,181 @@
+#include "server/jobs/sqlite_schema.h"
+
+#include <sys/vfs.h>
+
+#include <array>
+#include <span>
+
+namespace kiln::sql {
+namespace {
+
+constexpr const char* kTables = R"sql(
+CREATE TABLE job(
+  id TEXT PRIMARY KEY CHECK(length(id) = 26),
+  state TEXT NOT NULL CHECK(state IN ('queued', 'running', 'succeeded', 'failed', 'canceled')),
+  label TEXT NOT NULL,
+  recipe TEXT NOT NULL,
+  content_key TEXT NOT NULL,
+  force INTEGER NOT NULL CHECK(force IN (0, 1)),
+  cached INTEGER NOT NULL DEFAULT 0 CHECK(cached IN (0, 1)),
+  attempt INTEGER NOT NULL DEFAULT 0 CHECK(attempt >= 0),
+  crashes INTEGER NOT NULL DEFAULT 0,
+  retries INTEGER NOT NULL DEFAULT 0,
+  created_at INTEGER NOT NULL,
+  started_at INTEGER,
+  finished_at INTEGER,
+  run_after INTEGER NOT NULL,
+  cancel_requested_at INTEGER,
+  lease_owner TEXT,
+  lease_until INTEGER,
+  fence INTEGER NOT NULL DEFAULT 0,
+  version INTEGER NOT NULL DEFAULT 0,
+  stage TEXT, done INTEGER, total INTEGER, fraction REAL, eta_s REAL,
+  error_code TEXT, error_message TEXT, error_where TEXT, error_status INTEGER,
+  idempotency_key TEXT UNIQUE,
+  request_hash TEXT NOT NULL,
+  CHECK((finished_at IS NOT NULL) = (state IN ('succeeded', 'failed', 'canceled'))),
+  CHECK((lease_owner IS NOT NULL) = (state = 'running')),
+  CHECK((lease_until IS NOT NULL) = (state = 'running')),
+  CHECK((error_code IS NOT NULL) = (state = 'failed'))
+) STRICT;
+CREATE INDEX job_by_age ON job(created_at, id);
+CREATE INDEX job_by_state ON job(state, created_at, id);
+CREATE INDEX job_by_label ON job(label, created_at, id);
+CREATE INDEX job_queued ON job(id) WHERE state = 'queued';
+CREATE INDEX job_running ON job(id) WHERE state = 'running';
+CREATE INDEX job_by_content ON job(content_key, finished_at) WHERE finished_at IS NOT NULL;
+
+CREATE TABLE blob(
+  sha256 TEXT PRIMARY KEY CHECK(length(sha256) = 64),
+  bytes INTEGER NOT NULL CHECK(bytes >= 0),
+  last_ref_at INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE job_input(
+  job_id TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,
+  role TEXT NOT NULL CHECK(role IN ('scene', 'resource', 'environment')),
+  name TEXT NOT NULL,
+  sha256 TEXT NOT NULL REFERENCES blob(sha256),
+  PRIMARY KEY(job_id, role, name)
+) STRICT;
+CREATE INDEX job_input_by_blob ON job_input(sha256);
+
+CREATE TABLE artifact(
+  job_id TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,
+  position INTEGER NOT NULL,
+  name TEXT NOT NULL,
+  media_type TEXT NOT NULL,
+  sha256 TEXT NOT NULL REFERENCES blob(sha256),
+  bytes INTEGER NOT NULL CHECK(bytes >= 0),
+  fence INTEGER NOT NULL,
+  PRIMARY KEY(job_id, name)
+) STRICT;
+CREATE INDEX artifact_by_blob ON artifact(sha256);
+
+CREATE TABLE job_event(
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  job_id TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,
+  at INTEGER NOT NULL,
+  kind TEXT NOT NULL CHECK(kind IN ('state', 'log', 'artifact', 'done')),
+  state TEXT NOT NULL,
+  message TEXT NOT NULL
+) STRICT;
+CREATE INDEX job_event_by_job ON job_event(job_id, id);
+
+-- One row each: the last fence given out, and a place to try whether writing works.
+CREATE TABLE counter(name TEXT PRIMARY KEY, value INTEGER NOT NULL) STRICT;
+INSERT INTO counter VALUES('fence', 0), ('ready', 0);
+
+CREATE TRIGGER job_terminal_is_final BEFORE UPDATE OF state ON job
+  WHEN OLD.finished_at IS NOT NULL BEGIN SELECT RAISE(ABORT, 'terminal states never change'); END;
+CREATE TRIGGER job_event_is_append_only BEFORE UPDATE ON job_event
+  BEGIN SELECT RAISE(ABORT, 'events are append-only'); END;
+)sql";
+
+struct Setting {
+  const char* set;
+  const char* read;
+  const char* expected;
+};
+
+// reliability.md 5.3. FULL: NORMAL may lose the last commits at power loss.
+constexpr std::array kWriterSettings{
+    Setting{"PRAGMA journal_mode=WAL", "PRAGMA journal_mode", "wal"},
+    Setting{"PRAGMA synchronous=FULL", "PRAGMA synchronous", "2"},
+    Setting{"PRAGMA foreign_keys=ON", "PRAGMA foreign_keys", "1"},
+    Setting{"PRAGMA busy_timeout=5000", "PRAGMA busy_timeout", "5000"},
+    Setting{"PRAGMA trusted_schema=OFF", "PRAGMA trusted_schema", "0"},
+    Setting{"PRAGMA mmap_size=0", "PRAGMA mmap_size", "0"},
+};
+
+constexpr std::array kReaderSettings{
+    Setting{"PRAGMA query_only=1", "PRAGMA query_only", "1"},
+    Setting{"PRAGMA wal_autocheckpoint=0", "PRAGMA wal_autocheckpoint", "0"},
+    Setting{"PRAGMA busy_timeout=5000", "PRAGMA busy_timeout", "5000"},
+    Setting{"PRAGMA trusted_schema=OFF", "PRAGMA trusted_schema", "0"},
+    Setting{"PRAGMA mmap_size=0", "PRAGMA mmap_size", "0"},
+};
+
+Result<std::string> single_value(Database& db, const char* statement) {
+  KILN_TRY(rows, db.query(statement));
+  KILN_TRY(found, rows.next());
+  return found ? rows.text(0) : std::string();
+}
+
+Result<void> apply_settings(Database& db, std::span<const Setting> settings) {
+  for (const Setting& setting : settings) {
+    KILN_DO(db.execute(setting.set));
+    KILN_TRY(value, single_value(db, setting.read));
+    // mmap_size answers nothing where memory mapping is compiled out: that is off as well.
+    if (value != setting.expected && !(value.empty() && std::string_view(setting.expected) == "0")) {
+      return fault("store_failed", std::string("SQLite did not take the setting '") + setting.set + "'");
+    }
+  }
+  return {};
+}
+
+/// WAL needs shared memory and locks that network file systems do not keep.
+Result<void> refuse_network_files(const std::filesystem::path& file) {
+  constexpr long kNfsMagic = 0x6969, kSmbMagic = 0x517B, kSmb2Magic = 0xFE534D42;
+  struct statfs where {};
+  if (::statfs(file.parent_path().c_str(), &where) != 0)
+    return fault("io_failed", "the data folder cannot be examined");
+  const long type = where.f_type;
+  if (type == kNfsMagic || type == kSmbMagic || type == kSmb2Magic) {
+    return fault("network_file_system", "the job store must lie on a local disk, not on a network file system");
+  }
+  return {};
+}
+
+Result<void> make_tables(Database& db) {
+  KILN_TRY(transaction, Transaction::begin(db));
+  KILN_TRY(version, single_value(db, "PRAGMA user_version"));
+  if (version == "0") {
+    KILN_DO(db.execute(kTables));
+    KILN_DO(db.execute(("PRAGMA user_version=" + std::to_string(kSchemaVersion)).c_str()));
+  } else if (version != std::to_string(kSchemaVersion)) {
+    return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +
+                                       ", this one knows " + std::to_string(kSchemaVersion) + ")");
+  }
+  return transaction.commit();
+}
+
+}  // namespace
+
+Result<Database> open_writer(const std::filesystem::path& file) {
+  KILN_DO(refuse_network_files(file));
+  KILN_TRY(db, Database::open(file, Database::Mode::read_write));
+  KILN_DO(apply_settings(db, kWriterSettings));
+  KILN_TRY(state, single_value(db, "PRAGMA quick_check(1)"));
+  if (state != "ok") return fault("store_damaged", "the job store is damaged (quick_check failed)");
+  KILN_DO(make_tables(db));
+  return db;
+}
+
+Result<Database> open_reader(const std::filesystem::path& file) {
+  KILN_TRY(db, Database::open(file, Database::Mode::read_only));
+  KILN_DO(apply_settings(db, kReaderSettings));
+  return db;
+}
+
+}  // namespace kiln::sql
