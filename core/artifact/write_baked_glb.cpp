@@ -1,0 +1,232 @@
+// BakedScene -> scene.glb. core/artifact/README.md specifies what is written here.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "core/artifact/baked_geometry.h"
+#include "core/artifact/baked_scene.h"
+#include "core/artifact/glb.h"
+#include "core/artifact/json_text.h"
+#include "core/artifact/look.h"
+#include "core/artifact/png.h"
+#include "core/base/expects.h"
+
+namespace kiln {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+constexpr int kFloat = 5126, kUnsignedInt = 5125;
+constexpr const char* kTransfer = "KILN_radiance_transfer";
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+
+json vec(const Vec3f& v) { return {v.x, v.y, v.z}; }
+
+void check_shape(const BakedScene& baked) {
+  const Mesh& mesh = baked.scene.mesh;
+  EXPECTS(baked.transfer.order >= 1 && baked.transfer.order <= kMaxShOrder);
+  EXPECTS(baked.transfer.channels == 1 || baked.transfer.channels == 3);
+  EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
+  EXPECTS(mesh.part.size() == mesh.triangles.size());
+}
+
+std::vector<Vec3f> displayed_colors(const BakedScene& baked) {
+  std::vector<Vec3f> out = baked_colors(baked);
+  for (Vec3f& c : out) c = tone_map(c * baked.exposure);
+  return out;
+}
+
+/// The document under construction and its binary chunk.
+class Writer {
+ public:
+  Writer(const BakedScene& baked, const Encoding& encoding) : baked_(baked), encoding_(encoding) {}
+
+  Result<Bytes> write() {
+    const auto vertices = used_vertices(baked_.scene.mesh);
+    if (vertices.empty()) return fault("nothing_to_write", "The baked scene has no triangle.");
+    ranges_ = slot_ranges(baked_.transfer, vertices);
+    if (const auto done = add_parts(); !done) return tl::make_unexpected(done.error());
+    add_images();
+    std::string text = document().dump(-1, ' ', false, json::error_handler_t::replace);
+    return join_glb(std::move(text), std::move(binary_));
+  }
+
+ private:
+  std::size_t add_view(std::span<const std::uint8_t> bytes) {
+    binary_.resize((binary_.size() + 3) / 4 * 4, 0);
+    views_.push_back({{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes.size()}});
+    binary_.insert(binary_.end(), bytes.begin(), bytes.end());
+    return views_.size() - 1;
+  }
+
+  /// The same bytes under a second index: some loaders consume a Draco buffer view at first use (three.js does).
+  std::size_t add_view_again(std::size_t view) {
+    views_.push_back(json(views_[view]));
+    return views_.size() - 1;
+  }
+
+  std::size_t add_accessor(json accessor) {
+    accessors_.push_back(std::move(accessor));
+    return accessors_.size() - 1;
+  }
+
+  Result<void> add_parts() {
+    const GeometryOptions options{encoding_, true};
+    for (const PartPrimitive& part : part_primitives(baked_, ranges_, displayed_colors(baked_), options)) {
+      KILN_TRY(bytes, encode_draco(part.mesh, encoding_.speed));
+      KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), part.mesh.triangles.size()}));
+      add_primitives(part, decoded, add_view(bytes));
+    }
+    return {};
+  }
+
+  /// An accessor without a buffer view, as the Draco extension asks; counts and bounds are those of the decoded data.
+  std::size_t add_stream_accessor(const std::string& name, const DecodedStream& stream, std::uint32_t count) {
+    static constexpr std::array kTypes{"SCALAR", "VEC2", "VEC3", "VEC4"};
+    json accessor{
+        {"componentType", kFloat}, {"count", count}, {"type", kTypes[static_cast<std::size_t>(stream.components - 1)]}};
+    if (name == "POSITION") put_bounds(stream.values, accessor);
+    return add_accessor(std::move(accessor));
+  }
+
+  static void put_bounds(const std::vector<float>& positions, json& accessor) {
+    std::array<float, 3> low{positions[0], positions[1], positions[2]}, high = low;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      low[i % 3] = std::min(low[i % 3], positions[i]);
+      high[i % 3] = std::max(high[i % 3], positions[i]);
+    }
+    accessor["min"] = low;
+    accessor["max"] = high;
+  }
+
+  void add_primitives(const PartPrimitive& source, const DecodedMesh& decoded, std::size_t view) {
+    const Part& part = baked_.scene.parts[source.part];
+    const std::size_t materials = baked_.scene.materials.size(), material = static_cast<std::size_t>(part.material);
+    const std::size_t indices =
+        add_accessor({{"componentType", kUnsignedInt}, {"count", decoded.triangles.size() * 3}, {"type", "SCALAR"}});
+    json baked_attributes, baked_ids, original_attributes, original_ids;
+    for (std::uint32_t id = 0; id < source.names.size(); ++id) {
+      const NamedStream& name = source.names[id];
+      const std::size_t accessor = add_stream_accessor(name.name, decoded.streams.at(id), decoded.vertices);
+      if (name.in_baked) baked_attributes[name.name] = accessor, baked_ids[name.name] = id;
+      if (name.in_original) original_attributes[name.name] = accessor, original_ids[name.name] = id;
+    }
+    const auto primitive = [&](const json& attributes, const json& ids, std::size_t material) -> json {
+      const json draco{{"bufferView", material < materials ? add_view_again(view) : view}, {"attributes", ids}};
+      return {{"attributes", attributes},
+              {"indices", indices},
+              {"material", material},
+              {"mode", 4},
+              {"extensions", {{kDraco, draco}}}};
+    };
+    json baked = primitive(baked_attributes, baked_ids, materials + material);
+    const PartLook look = part_look(baked_.scene, part);
+    baked["extensions"][kTransfer] = {
+        {"name", part.name}, {"material", material}, {"albedo", vec(look.albedo)}, {"emission", vec(look.emission)}};
+    baked_primitives_.push_back(std::move(baked));
+    original_primitives_.push_back(primitive(original_attributes, original_ids, material));
+  }
+
+  /// Images keep their index; one whose bytes were lost becomes a white pixel.
+  void add_images() {
+    for (const Image& image : baked_.scene.images) {
+      const bool lost = image.encoded.empty();
+      const Bytes white = lost ? write_png({1, 1, 3}, Bytes{255, 255, 255}) : Bytes{};
+      images_.push_back({{"name", image.name},
+                         {"mimeType", lost ? "image/png" : image.mime},
+                         {"bufferView", add_view(lost ? white : image.encoded)}});
+    }
+  }
+
+  json transfer_extension() const {
+    const Transfer& t = baked_.transfer;
+    json attributes = json::array(), light = json::array();
+    for (std::size_t k = 0; k < slot_vec4s(t.stride()); ++k) attributes.push_back("_PRT_" + std::to_string(k));
+    for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
+    return {{"version", 1},
+            {"basis", "real-sh"},
+            {"condonShortley", false},
+            {"frame", "world, +Y up"},
+            {"order", t.order},
+            {"channels", t.channels},
+            {"fixed", t.fixed},
+            {"slots", t.slots()},
+            {"attributes", attributes},
+            {"scale", ranges_.scale},
+            {"offset", ranges_.offset},
+            {"light", {{"name", baked_.light.name}, {"coefficients", light}}},
+            {"look", {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}}},
+            {"units", "W m^-2 sr^-1"}};
+  }
+
+  void put_scenes(json& out, const json& light_nodes) const {
+    const Frame& frame = baked_.scene.frame;
+    const auto node = [&](const char* name, int mesh) -> json {
+      return {{"name", name},
+              {"mesh", mesh},
+              {"translation", {frame.center.x, frame.center.y, frame.center.z}},
+              {"scale", {frame.scale, frame.scale, frame.scale}}};
+    };
+    json nodes = json::array({node("baked", 0), node("original", 1)}), original = json::array({1});
+    for (const json& light : light_nodes) {
+      original.push_back(nodes.size());
+      nodes.push_back(light);
+    }
+    out["scene"] = 0;
+    out["scenes"] =
+        json::array({{{"name", "baked"}, {"nodes", json::array({0})}}, {{"name", "original"}, {"nodes", original}}});
+    out["nodes"] = nodes;
+    out["meshes"] = json::array({{{"name", "baked"}, {"primitives", baked_primitives_}},
+                                 {{"name", "original"}, {"primitives", original_primitives_}}});
+  }
+
+  json extensions_used(const LookJson& look) const {
+    std::vector<std::string> out = look.extensions;
+    out.insert(out.end(), {kDraco, kTransfer});
+    std::ranges::sort(out);
+    return out;
+  }
+
+  json document() const {
+    const LookJson look = look_json(baked_.scene);
+    json out;
+    out["asset"] = {{"version", "2.0"},
+                    {"generator", "Kiln"},
+                    {"extras", {{"kiln", json::parse(baked_.provenance.empty() ? "{}" : baked_.provenance)}}}};
+    out["extensionsUsed"] = extensions_used(look);
+    out["extensionsRequired"] = json::array({kDraco});
+    out["extensions"][kTransfer] = transfer_extension();
+    const json lights = json::parse(look.lights);
+    if (!lights.empty()) out["extensions"]["KHR_lights_punctual"]["lights"] = lights;
+    put_scenes(out, json::parse(look.light_nodes));
+    out["materials"] = json::parse(look.materials);
+    const auto put = [&](const char* name, json array) {
+      if (!array.empty()) out[name] = std::move(array);
+    };
+    put("textures", json::parse(look.textures));
+    put("samplers", json::parse(look.samplers));
+    put("images", images_);
+    out["accessors"] = accessors_;
+    out["bufferViews"] = views_;
+    out["buffers"] = json::array({{{"byteLength", (binary_.size() + 3) / 4 * 4}}});
+    return out;
+  }
+
+  const BakedScene& baked_;
+  const Encoding& encoding_;
+  SlotRanges ranges_;
+  Bytes binary_;
+  json views_ = json::array(), accessors_ = json::array(), images_ = json::array();
+  json baked_primitives_ = json::array(), original_primitives_ = json::array();
+};
+
+}  // namespace
+
+Result<Bytes> write_baked_glb(const BakedScene& baked, const Encoding& encoding) {
+  check_shape(baked);
+  return Writer(baked, encoding).write();
+}
+
+}  // namespace kiln

@@ -1,0 +1,15 @@
+#pragma once
+// Small baked scenes made in code, without a bake: known geometry, transfer by closed forms.
+
+#include "core/artifact/baked_scene.h"
+
+namespace kiln {
+
+/// A tessellated sphere over a plane, lit by a soft sky: two parts, uv on the plane (with a checker texture), vertex
+/// colours on the sphere. Transfer is the clamped cosine times a smooth guess of the occlusion; `order` 1..10.
+BakedScene sphere_over_plane(int order, int channels, bool fixed);
+
+/// One triangle in the plane y = 0 with the given normal at its corners; order and channels as asked, all slots zero.
+BakedScene single_triangle(int order, int channels, bool fixed);
+
+}  // namespace kiln
