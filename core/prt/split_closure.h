@@ -8,22 +8,20 @@
 
 namespace kiln {
 
-/// Ops answers split(a, b), middle(a, b) and position(a) for the ids in `t`, and takes emit(triangle, level).
+/// Ops answers split(a, b), middle(a, b) and position(a) for the ids in `t`, and takes emit(triangle).
 template <class Ops>
-void close_triangle(const Triangle& t, Ops& ops, int level = 0) {
+void close_triangle(const Triangle& t, Ops& ops) {
   std::array<bool, 3> cut{};
   int cuts = 0;
   for (std::size_t k = 0; k < 3; ++k) cuts += (cut[k] = ops.split(t[k], t[(k + 1) % 3])) ? 1 : 0;
-  if (cuts == 0) return ops.emit(t, level);
+  if (cuts == 0) return ops.emit(t);
 
   // Turn the triangle: with one cut it lies on ab, with two on ab and bc.
   std::size_t first = 0;
   while (!cut[first] || (cuts == 2 && !cut[(first + 1) % 3])) ++first;
   const std::uint32_t a = t[first], b = t[(first + 1) % 3], c = t[(first + 2) % 3];
   const std::uint32_t ab = ops.middle(a, b);
-  const auto next = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
-    close_triangle(Triangle{i, j, k}, ops, level + 1);
-  };
+  const auto next = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) { close_triangle(Triangle{i, j, k}, ops); };
 
   if (cuts == 1) {
     next(a, ab, c);

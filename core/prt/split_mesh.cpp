@@ -81,7 +81,7 @@ struct SplitMesh::Counter {
     return self.point_at(kiln::middle(position(p), position(q)));
   }
   Vec3f position(std::uint32_t p) const { return self.point_[p]; }
-  void emit(const Triangle&, int) { ++triangles; }
+  void emit(const Triangle&) { ++triangles; }
 };
 
 std::uint32_t SplitMesh::count_closed(std::uint32_t leaf) {
@@ -166,10 +166,10 @@ struct SplitMesh::Emitter {
   bool split(std::uint32_t a, std::uint32_t b) const { return self.is_split(a, b); }
   std::uint32_t middle(std::uint32_t a, std::uint32_t b) { return self.midpoint(leaf, a, b); }
   Vec3f position(std::uint32_t a) const { return self.mesh_.position[a]; }
-  void emit(const Triangle& t, int level) {
+  void emit(const Triangle& t) {
     out.mesh.triangles.push_back(t);
     out.mesh.part.push_back(leaf.part);
-    out.depth.push_back(static_cast<std::uint8_t>(leaf.depth + level));
+    out.depth.push_back(leaf.depth);
   }
 };
 
