@@ -1,0 +1,53 @@
+// The published schema and the parser must agree on every document.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <valijson/adapters/nlohmann_json_adapter.hpp>
+#include <valijson/schema.hpp>
+#include <valijson/schema_parser.hpp>
+#include <valijson/validator.hpp>
+
+#include "core/bake/recipe.h"
+
+namespace kiln {
+namespace {
+
+bool schema_accepts(const nlohmann::json& document) {
+  const nlohmann::json text = nlohmann::json::parse(recipe_schema());
+  valijson::Schema schema;
+  valijson::SchemaParser parser;
+  parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(text), schema);
+  valijson::Validator validator;
+  return validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), nullptr);
+}
+
+class SchemaAndParser : public testing::TestWithParam<std::pair<const char*, bool>> {};
+
+TEST_P(SchemaAndParser, AgreeOnADocument) {
+  const auto& [text, good] = GetParam();
+  EXPECT_EQ(parse_recipe(text).has_value(), good) << text;
+  EXPECT_EQ(schema_accepts(nlohmann::json::parse(text)), good) << text;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Documents, SchemaAndParser,
+    testing::Values(std::pair{"{}", true}, std::pair{R"({"quality":"final"})", true},
+                    std::pair{R"({"quality":"best"})", false}, std::pair{R"({"quality":{"target_error":0.1}})", false},
+                    std::pair{R"({"steps":[]})", false}, std::pair{R"({"steps":[{}]})", false},
+                    std::pair{R"({"steps":[{"do":"grid"}]})", false},
+                    std::pair{R"({"steps":[{"do":"prt","order":"auto","bounces":3,"samples":65536}]})", true},
+                    std::pair{R"({"steps":[{"do":"prt","samples":0}]})", false},
+                    std::pair{R"({"steps":[{"do":"prt","subdivide":"off"}]})", true},
+                    std::pair{R"({"steps":[{"do":"prt","subdivide":{"triangles":"auto","threshold":0}}]})", true},
+                    std::pair{R"({"steps":[{"do":"prt","subdivide":{"triangles":0}}]})", false},
+                    std::pair{R"({"steps":[{"do":"prt","encoding":{"form":"pca"}}]})", false},
+                    std::pair{R"({"steps":[{"do":"prt","encoding":{"bits":8}}]})", true},
+                    std::pair{R"({"scene":{"asset":"zz"}})", false},
+                    std::pair{R"({"environment":{"builtin":"overcast","rotation_deg":-90}})", true},
+                    std::pair{R"({"environment":{"constant":[0,1,2]}})", true},
+                    std::pair{R"({"environment":{"constant":[0,-1,2]}})", false},
+                    std::pair{R"({"limits":{"memory_mb":1}})", false}, std::pair{R"({"limits":{"wall_s":0.5}})", true},
+                    std::pair{R"({"label":7})", false}, std::pair{R"({"extra":7})", false}));
+
+}  // namespace
+}  // namespace kiln

@@ -1,0 +1,86 @@
+#include "core/bake/recipe.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace kiln {
+namespace {
+
+std::vector<std::string> pointers(const std::string& json) {
+  const auto recipe = parse_recipe(json);
+  std::vector<std::string> out;
+  if (!recipe) {
+    for (const FieldError& e : recipe.error()) out.push_back(e.pointer);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+TEST(Recipe, EmptyObjectIsOnePrtStepWithEverythingLeftToThePlan) {
+  const auto recipe = parse_recipe("{}");
+  ASSERT_TRUE(recipe);
+  ASSERT_EQ(recipe->steps.size(), 1U);
+  EXPECT_FALSE(recipe->steps[0].order);
+  EXPECT_EQ(recipe->quality, Quality::standard);
+  EXPECT_EQ(recipe->environment.kind, EnvironmentChoice::Kind::none);
+}
+
+TEST(Recipe, AllMistakesAreReportedTogetherWithTheirPointers) {
+  const std::vector<std::string> expected = {
+      "/environment/constant", "/limits/threads", "/steps/0/order", "/steps/0/subdivide/measure",
+      "/steps/0/typo",         "/strict",         "/surprise"};
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"prt","order":11,"typo":1,"subdivide":{"measure":"eq5"}}],
+                         "environment":{"constant":[1,2]},"limits":{"threads":-1},"strict":"yes","surprise":null})"),
+            expected);
+}
+
+TEST(Recipe, AnErrorSaysWhatStoodThereAndWhatMay) {
+  const auto recipe = parse_recipe(R"({"steps":[{"do":"prt","order":0}]})");
+  ASSERT_FALSE(recipe);
+  ASSERT_EQ(recipe.error().size(), 1U);
+  EXPECT_EQ(recipe.error()[0].received, "0");
+  EXPECT_EQ(recipe.error()[0].allowed, "an integer from 1 to 10");
+}
+
+TEST(Recipe, NumbersOutsideTheirTypeAreRefusedNotRounded) {
+  EXPECT_EQ(pointers(R"({"seed":1.5})"), std::vector<std::string>{"/seed"});
+  EXPECT_EQ(pointers(R"({"seed":18446744073709551615})"), std::vector<std::string>{"/seed"});
+  EXPECT_EQ(pointers(R"({"seed":-1})"), std::vector<std::string>{"/seed"});
+  EXPECT_EQ(pointers(R"({"environment":{"builtin":"clear","intensity":1e300}})"),
+            std::vector<std::string>{"/environment/intensity"});
+}
+
+TEST(Recipe, TwoLightsAtOnceAreRefused) {
+  EXPECT_EQ(pointers(R"({"environment":{"builtin":"clear","constant":[1,1,1]}})"),
+            std::vector<std::string>{"/environment"});
+}
+
+TEST(Recipe, WhatIsNotJsonOrTooDeepIsOneErrorAndNoCrash) {
+  EXPECT_EQ(pointers("{").size(), 1U);
+  EXPECT_EQ(pointers("[]").size(), 1U);
+  EXPECT_EQ(pointers(std::string(100'000, '[')).size(), 1U);
+  EXPECT_EQ(pointers(std::string("{\"label\":\"\xff\"}")).size(), 1U);
+}
+
+TEST(Recipe, CanonicalTextIsAFixedPoint) {
+  for (const Preset& preset : presets()) {
+    const auto recipe = parse_recipe(preset.recipe);
+    ASSERT_TRUE(recipe) << preset.name;
+    const auto again = parse_recipe(recipe_json(*recipe));
+    ASSERT_TRUE(again) << preset.name;
+    EXPECT_EQ(recipe_json(*again), recipe_json(*recipe)) << preset.name;
+  }
+}
+
+TEST(Recipe, IdentityIgnoresWhatLeavesTheBytesAlone) {
+  const auto a = parse_recipe(R"({"label":"x","limits":{"threads":1}})");
+  const auto b = parse_recipe(R"({"label":"y","limits":{"threads":2}})");
+  const auto c = parse_recipe(R"({"seed":7})");
+  ASSERT_TRUE(a && b && c);
+  EXPECT_EQ(recipe_identity(*a), recipe_identity(*b));
+  EXPECT_NE(recipe_identity(*a), recipe_identity(*c));
+}
+
+}  // namespace
+}  // namespace kiln
