@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Every header of ours compiles alone.   check_headers.sh COMPILER
+set -euo pipefail
+cd "$(dirname "$0")/.."
+compiler=${1:-g++}
+export compiler
+compile_alone() {
+  "$compiler" -std=c++20 -fsyntax-only -I. -x c++ - <<<"#include \"$1\"" || { echo "does not compile alone: $1"; return 1; }
+}
+export -f compile_alone
+find core server client_cli web_viewer \( -name node_modules -o -name dist \) -prune -o -name '*.h' -print |
+  xargs -P "$(nproc)" -I{} bash -c 'compile_alone {}'
