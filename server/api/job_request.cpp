@@ -103,7 +103,24 @@ void apply_preset(json& document, const json& name, std::vector<FieldError>& err
   document = std::move(base);
 }
 
-Answer<JobRequest> parse_document(json document) {
+/// Rules of a request that a recipe alone does not have.
+void check_sources(const Recipe& recipe, bool needs_scene, std::vector<FieldError>& errors) {
+  if (needs_scene && recipe.scene_asset.empty())
+    errors.push_back({"/scene/asset", "is missing", "", "the sha256 of an uploaded asset"});
+  if (recipe.environment.kind == EnvironmentChoice::Kind::file)
+    errors.push_back({"/environment/file", "is for the command line only", dump(json(recipe.environment.name)),
+                      "asset, constant, builtin"});
+}
+
+/// Puts the hashes of the files where the document would name assets.
+void apply_files(json& document, const JobFiles& files) {
+  if (!files.scene.empty()) document["scene"] = {{"asset", files.scene}};
+  if (files.environment.empty()) return;
+  if (!document.contains("environment") || document["environment"].is_null()) document["environment"] = json::object();
+  if (document["environment"].is_object()) document["environment"]["asset"] = files.environment;
+}
+
+Answer<JobRequest> parse_document(json document, const JobFiles& files, bool needs_scene) {
   std::vector<FieldError> errors;
   JobRequest request;
   const json force = take(document, "force");
@@ -111,15 +128,18 @@ Answer<JobRequest> parse_document(json document) {
   if (!force.is_null() && !force.is_boolean())
     errors.push_back(mistake("/force", "must be true or false", force, "true, false"));
   apply_preset(document, take(document, "preset"), errors);
+  apply_files(document, files);
 
   auto recipe = parse_recipe(dump(document));
-  if (!recipe) errors.insert(errors.end(), recipe.error().begin(), recipe.error().end());
+  if (recipe)
+    check_sources(*recipe, needs_scene, errors);
+  else
+    errors.insert(errors.end(), recipe.error().begin(), recipe.error().end());
   if (!errors.empty()) {
     const std::string count = std::to_string(errors.size()) + (errors.size() == 1 ? " mistake" : " mistakes");
     return refuse("invalid_recipe", "the job has " + count + "; each is listed in errors", std::move(errors));
   }
   request.recipe = std::move(*recipe);
-  request.recipe_json = recipe_json(request.recipe);
   return request;
 }
 
@@ -160,13 +180,13 @@ Answer<void> check_json(std::string_view text) {
   return refuse("malformed_json", "the body is no valid JSON (UTF-8) at " + line_and_column(text, check.position()));
 }
 
-Answer<JobRequest> parse_job_request(std::string_view text) {
+Answer<JobRequest> parse_job_request(std::string_view text, const JobFiles& files) {
   if (auto checked = check_json(text); !checked) return tl::make_unexpected(checked.error());
   json document = json::parse(text, nullptr, false);
   if (!document.is_object())
     return refuse("invalid_recipe", "the job must be an object",
                   {mistake("", "must be an object", document.type_name(), "object")});
-  return parse_document(std::move(document));
+  return parse_document(std::move(document), files, true);
 }
 
 Answer<JobRequest> parse_raw_request(const QueryParams& params) {
@@ -186,7 +206,7 @@ Answer<JobRequest> parse_raw_request(const QueryParams& params) {
     const auto seed = parse_decimal(value[5]);
     document["seed"] = seed ? json(*seed) : json(value[5]);
   }
-  return parse_document(std::move(document));
+  return parse_document(std::move(document), {}, false);
 }
 
 Answer<std::vector<std::string>> take_params(const QueryParams& params, const std::vector<std::string>& allowed) {

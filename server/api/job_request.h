@@ -16,8 +16,13 @@ using QueryParams = std::vector<std::pair<std::string, std::string>>;  // decode
 /// A job document: a recipe, plus `preset` (the recipe's base; members given beside it win) and `force`.
 struct JobRequest {
   Recipe recipe;
-  std::string recipe_json;  // canonical
-  bool force = false;       // bake even if the same result is known
+  bool force = false;  // bake even if the same result is known
+};
+
+/// Files that came with the document; each hash takes the place of the member that would name an asset.
+struct JobFiles {
+  std::string scene;        // sha256; empty: the document names the scene
+  std::string environment;  // sha256; empty: the document says
 };
 
 inline constexpr std::size_t kMaxJobDocument = 1u << 20;  // bytes
@@ -27,11 +32,11 @@ inline constexpr int kMaxJsonDepth = 64;
 /// Codes  malformed_json (400, with line and column), json_too_deep (422), duplicate_member (422)
 Answer<void> check_json(std::string_view json);
 
-/// Parses a job document. All mistakes at once.
-Answer<JobRequest> parse_job_request(std::string_view json);
+/// Parses a job document; with `files` the job is complete or refused. All mistakes at once.
+Answer<JobRequest> parse_job_request(std::string_view json, const JobFiles& files = {});
 
-/// The job of a raw upload, from its query: preset (required), label, environment, force, quality, seed.
-/// environment is the name of a built-in sky, r,g,b, or the sha256 of an asset.
+/// The job of a raw upload (its scene still unnamed), from its query: preset (required), label, environment, force,
+/// quality, seed, name (of the scene). environment is the name of a built-in sky, r,g,b, or the sha256 of an asset.
 Answer<JobRequest> parse_raw_request(const QueryParams&);
 
 struct JobListRequest {

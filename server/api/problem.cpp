@@ -25,6 +25,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"upload_busy", 409},
     {"offset_mismatch", 409},
     {"not_terminal", 409},
+    {"no_artifacts", 409},
     {"length_required", 411},
     {"too_large", 413},
     {"uri_too_long", 414},
