@@ -8,5 +8,5 @@ compile_alone() {
   "$compiler" -std=c++20 -fsyntax-only -I. -x c++ - <<<"#include \"$1\"" || { echo "does not compile alone: $1"; return 1; }
 }
 export -f compile_alone
-find core server client_cli web_viewer \( -name node_modules -o -name dist \) -prune -o -name '*.h' -print |
-  xargs -P "$(nproc)" -I{} bash -c 'compile_alone {}'
+find core server client_cli web_viewer \( -name node_modules -o -name dist \) -prune -o -name '*.h' -print0 |
+  xargs -0 -P "$(nproc)" -I{} bash -c 'compile_alone {}'
