@@ -1,5 +1,8 @@
 #include "core/bake/job_light.h"
 
+extern "C" const std::uint8_t kiln_courtyard_begin[];
+extern "C" const std::uint8_t kiln_courtyard_end[];
+
 namespace kiln {
 namespace {
 
@@ -9,6 +12,9 @@ Result<Environment> named_light(const BakeInput& input) {
   if (choice.kind == Kind::constant) return constant_sky(choice.constant);
   if (choice.kind == Kind::builtin && choice.name == "overcast") return overcast_sky();
   if (choice.kind == Kind::builtin && choice.name == "clear") return clear_sky_with_sun();
+  if (choice.kind == Kind::builtin && choice.name == "courtyard") {
+    return import_environment({kiln_courtyard_begin, kiln_courtyard_end}, "courtyard.exr");
+  }
   if (choice.kind == Kind::builtin) return constant_sky({1, 1, 1});
   if (input.environment.empty()) return fault("environment_missing", "the environment's file is empty or was not sent");
   return import_environment(input.environment, input.environment_name);

@@ -58,8 +58,9 @@ EnvironmentChoice read_environment(const json& value, Errors& errors) {
     note(Kind::constant, "");
     choice.constant = *rgb;
   }
-  constexpr const char* kSkies[] = {"uniform", "overcast", "clear"};
-  if (const auto sky = fields.word("builtin", {kSkies[0], kSkies[1], kSkies[2]})) note(Kind::builtin, kSkies[*sky]);
+  constexpr const char* kSkies[] = {"uniform", "overcast", "clear", "courtyard"};
+  if (const auto sky = fields.word("builtin", {kSkies[0], kSkies[1], kSkies[2], kSkies[3]}))
+    note(Kind::builtin, kSkies[*sky]);
   choice.rotation_deg = static_cast<float>(fields.number("rotation_deg", -360, 360).value_or(0));
   choice.intensity = static_cast<float>(fields.number("intensity", 0, 1e9).value_or(1));
   fields.finish();

@@ -23,7 +23,7 @@ std::string recipe_schema() {
         "asset": {"$ref": "#/definitions/sha256"},
         "file": {"type": "string", "maxLength": 4096},
         "constant": {"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "number", "minimum": 0, "maximum": 1e9}},
-        "builtin": {"enum": ["uniform", "overcast", "clear"]},
+        "builtin": {"enum": ["uniform", "overcast", "clear", "courtyard"]},
         "rotation_deg": {"type": "number", "minimum": -360, "maximum": 360, "default": 0},
         "intensity": {"type": "number", "minimum": 0, "maximum": 1e9, "default": 1}
       }
