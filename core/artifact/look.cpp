@@ -85,4 +85,10 @@ std::vector<Vec3f> baked_colors(const BakedScene& baked) {
   return out;
 }
 
+std::vector<Vec3f> displayed_colors(const BakedScene& baked) {
+  std::vector<Vec3f> out = baked_colors(baked);
+  for (Vec3f& c : out) c = tone_map(c * baked.exposure);
+  return out;
+}
+
 }  // namespace kiln

@@ -19,14 +19,17 @@ inline constexpr const char* kToneMapName = "shoulder-0.6";
 float tone_map(float x);
 Vec3f tone_map(const Vec3f& exposed);
 
-/// The exposure at which the area-weighted 90th percentile of the brightest channel displays as 0.8.
-/// `radiance` has one value per vertex. 1 where the percentile is zero; the highest percentile that is lit counts then.
+/// The exposure at which the brightest channel of the lit area's 90th percentile displays as 0.8; area that no light
+/// reaches does not count. `radiance` has one value per vertex. 1 where nothing is lit.
 float automatic_exposure(const Mesh&, std::span<const Vec3f> radiance);
 
 /// Linear exit radiance of each vertex under BakedLight:
 ///   albedo factor x vertex colour x value + emission factor
 /// Textures are left out: a base colour texture multiplies in the viewer, textured emission does not count.
 std::vector<Vec3f> baked_colors(const BakedScene&);
+
+/// COLOR_0 of each vertex: the tone map of exposure x baked_colors.
+std::vector<Vec3f> displayed_colors(const BakedScene&);
 
 /// The part of each vertex; parts do not share vertices. Vertices without a triangle get part 0.
 std::vector<std::uint32_t> part_of_vertices(const Mesh&);

@@ -30,4 +30,6 @@ Bytes write_png(const PixelShape& shape, std::span<const std::uint8_t> pixels) {
   return out;
 }
 
+Bytes white_pixel_png() { return write_png({1, 1, 3}, Bytes{255, 255, 255}); }
+
 }  // namespace kiln

@@ -17,4 +17,7 @@ struct PixelShape {
 /// Repeat: same bytes for same pixels.
 Bytes write_png(const PixelShape&, std::span<const std::uint8_t> pixels);
 
+/// One white pixel: stands for an image whose bytes were lost.
+Bytes white_pixel_png();
+
 }  // namespace kiln

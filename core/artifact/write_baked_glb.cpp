@@ -8,8 +8,8 @@
 #include "core/artifact/baked_geometry.h"
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/glb.h"
-#include "core/artifact/json_text.h"
 #include "core/artifact/look.h"
+#include "core/artifact/look_json.h"
 #include "core/artifact/png.h"
 #include "core/base/expects.h"
 
@@ -30,12 +30,6 @@ void check_shape(const BakedScene& baked) {
   EXPECTS(baked.transfer.channels == 1 || baked.transfer.channels == 3);
   EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
   EXPECTS(mesh.part.size() == mesh.triangles.size());
-}
-
-std::vector<Vec3f> displayed_colors(const BakedScene& baked) {
-  std::vector<Vec3f> out = baked_colors(baked);
-  for (Vec3f& c : out) c = tone_map(c * baked.exposure);
-  return out;
 }
 
 /// The document under construction and its binary chunk.
@@ -133,10 +127,9 @@ class Writer {
   void add_images() {
     for (const Image& image : baked_.scene.images) {
       const bool lost = image.encoded.empty();
-      const Bytes white = lost ? write_png({1, 1, 3}, Bytes{255, 255, 255}) : Bytes{};
       images_.push_back({{"name", image.name},
                          {"mimeType", lost ? "image/png" : image.mime},
-                         {"bufferView", add_view(lost ? white : image.encoded)}});
+                         {"bufferView", add_view(lost ? white_pixel_png() : image.encoded)}});
     }
   }
 

@@ -1,12 +1,12 @@
 // Materials, textures and lights as glTF.
 
+#include "core/artifact/look_json.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
-
-#include "core/artifact/json_text.h"
 
 namespace kiln {
 namespace {

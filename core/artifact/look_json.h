@@ -1,5 +1,5 @@
 #pragma once
-// JSON documents pass between our files as text: no library type stands in a header.
+// Materials, textures and lights as glTF. JSON passes between our files as text: no library type stands in a header.
 
 #include <cstdint>
 #include <string>
@@ -16,17 +16,5 @@ struct LookJson {
   std::vector<std::string> extensions;  // used by them, sorted
 };
 LookJson look_json(const Scene&);
-
-/// What look_json's texts say. `images` is the number of images in the file.
-struct LookText {
-  std::string materials, textures, samplers, lights, light_nodes;
-  std::size_t images = 0;
-};
-struct Look {
-  std::vector<Material> materials;  // originals and twins
-  std::vector<Texture> textures;
-  std::vector<Light> lights;  // in unit-cube lengths
-};
-Result<Look> read_look(const LookText&, const Frame&);
 
 }  // namespace kiln

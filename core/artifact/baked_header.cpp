@@ -1,0 +1,147 @@
+#include "core/artifact/baked_header.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/artifact/json_fields.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kExtension = "KILN_radiance_transfer";
+constexpr const char* kPlace = "/extensions/KILN_radiance_transfer";
+constexpr double kLargest = 1e38;  // anything above might not fit a float
+
+/// The element at a pointer, or null if there is none.
+const json& at(const json& root, const std::string& pointer) {
+  static const json nothing;
+  const json::json_pointer place(pointer);
+  return root.contains(place) ? root.at(place) : nothing;
+}
+
+/// Numbers that a float holds; `count` of them.
+std::vector<double> numbers(const json& array, const std::string& place, std::size_t count, Findings& findings) {
+  std::vector<double> out(count, 0);
+  if (!array.is_array() || array.size() != count) {
+    findings.fail("slot_count_mismatch", "There must be " + std::to_string(count) + " numbers.", place);
+    return out;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (array[i].is_number()) out[i] = array[i].get<double>();
+    if (!array[i].is_number() || !(std::abs(out[i]) <= kLargest)) {
+      findings.fail("number_out_of_range", "This is not a number that a float holds.", place + "/" + std::to_string(i));
+      return out;
+    }
+  }
+  return out;
+}
+
+void check_conventions(const Fields& extension, Findings& findings) {
+  if (extension.count("version", 0) != 1) {
+    findings.fail("unsupported_version", "Only version 1 of KILN_radiance_transfer is read.",
+                  extension.pointer("version"));
+  }
+  if (extension.text("basis") != "real-sh" || extension.flag("condonShortley", true)) {
+    findings.fail("not_a_baked_scene", "The basis must be real-sh without the Condon-Shortley phase.",
+                  extension.pointer("basis"));
+  }
+}
+
+Transfer read_shape(const Fields& extension, Findings& findings) {
+  Transfer out;
+  const std::uint64_t order = extension.count("order", 0), channels = extension.count("channels", 0);
+  if (order < 1 || order > kMaxShOrder) {
+    findings.fail("number_out_of_range", "The order must be 1 to 10.", extension.pointer("order"));
+    return out;
+  }
+  if (channels != 1 && channels != 3) {
+    findings.fail("number_out_of_range", "There must be 1 or 3 channels.", extension.pointer("channels"));
+    return out;
+  }
+  out = {static_cast<int>(order), static_cast<int>(channels), extension.flag("fixed", false), {}};
+  if (extension.count("slots", 0) != static_cast<std::uint64_t>(out.slots())) {
+    findings.fail("slot_count_mismatch", "Order and fixed light ask for another number of slots.",
+                  extension.pointer("slots"));
+  }
+  return out;
+}
+
+void check_attribute_names(const Fields& extension, const Transfer& shape, Findings& findings) {
+  const std::vector<std::string> names = extension.texts("attributes");
+  bool right = names.size() == slot_vec4s(shape.stride());
+  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == "_PRT_" + std::to_string(k);
+  if (!right) {
+    findings.fail("slot_count_mismatch", "The attributes must be _PRT_0 and on, four slots in each.",
+                  extension.pointer("attributes"));
+  }
+}
+
+BakedLight read_light(const json& root, const Fields& extension, int order, Findings& findings) {
+  BakedLight out{extension.object("light").text("name"), {}};
+  const std::string place = std::string(kPlace) + "/light/coefficients";
+  const json& list = at(root, place);
+  if (!list.is_array() || list.empty()) return out;
+  if (list.size() != static_cast<std::size_t>(sh_count(order))) {
+    findings.fail("slot_count_mismatch", "The light must have one colour for each coefficient.", place);
+    return out;
+  }
+  for (std::size_t i = 0; i < list.size() && !findings.failed(); ++i) {
+    const auto c = numbers(list[i], place + "/" + std::to_string(i), 3, findings);
+    out.coefficients.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])});
+  }
+  return out;
+}
+
+float read_exposure(const Fields& extension, Findings& findings) {
+  const Fields look = extension.object("look");
+  const double exposure = look.number("exposure", 1);
+  if (!(exposure > 0 && exposure <= kLargest)) {
+    findings.fail("number_out_of_range", "The exposure must be above zero.", look.pointer("exposure"));
+  }
+  return static_cast<float>(exposure);
+}
+
+std::vector<BakedHeader::PartHeader> read_parts(const json& root, Findings& findings) {
+  std::vector<BakedHeader::PartHeader> out;
+  const json& meshes = at(root, "/meshes");
+  if (!meshes.is_array() || meshes.empty()) return out;
+  Fields(meshes[0], "/meshes/0", findings).for_each("primitives", [&](const Fields& primitive) {
+    if (!primitive.has_extension(kExtension)) {
+      findings.fail("not_a_baked_scene", "A primitive of mesh 0 lacks its extension.", primitive.pointer());
+      return;
+    }
+    const Fields part = primitive.extension(kExtension);
+    out.push_back({part.text("name"), part.index("material", 1u << 30)});
+  });
+  return out;
+}
+
+}  // namespace
+
+BakedHeader read_baked_header(std::span<const std::uint8_t> text, Findings& findings) {
+  const json root = json::parse(text.begin(), text.end(), nullptr, /*allow_exceptions=*/false);
+  BakedHeader out;
+  if (!at(root, kPlace).is_object()) {
+    findings.fail("not_a_baked_scene", "The file has no KILN_radiance_transfer extension: Kiln did not bake it.");
+    return out;
+  }
+  const Fields extension(at(root, kPlace), kPlace, findings);
+  check_conventions(extension, findings);
+  out.shape = read_shape(extension, findings);
+  if (findings.failed()) return out;
+  check_attribute_names(extension, out.shape, findings);
+  out.ranges.scale =
+      numbers(at(root, std::string(kPlace) + "/scale"), std::string(kPlace) + "/scale", out.shape.stride(), findings);
+  out.ranges.offset =
+      numbers(at(root, std::string(kPlace) + "/offset"), std::string(kPlace) + "/offset", out.shape.stride(), findings);
+  out.light = read_light(root, extension, out.shape.order, findings);
+  out.exposure = read_exposure(extension, findings);
+  const json& provenance = at(root, "/asset/extras/kiln");
+  out.provenance = provenance.is_object() ? provenance.dump(-1, ' ', false, json::error_handler_t::replace) : "{}";
+  out.parts = read_parts(root, findings);
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,279 @@
+// scene.glb -> BakedScene: as a viewer decodes it, but every index, count and number is checked first.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/artifact/baked_header.h"
+#include "core/artifact/baked_scene.h"
+#include "core/artifact/draco_codec.h"
+#include "core/artifact/gltf_bytes.h"
+#include "core/artifact/gltf_check.h"
+#include "core/artifact/gltf_container.h"
+#include "core/artifact/gltf_parse.h"
+#include "core/artifact/json_scan.h"
+
+namespace kiln {
+namespace {
+
+constexpr float kCubeHalf = 0.5F + 1e-5F;    // quantised corners may round outwards by a step of float
+constexpr float kUnitTolerance = 0.01F;      // octahedral decoding leaves unit vectors to within 1e-3 at 8 bits
+constexpr double kRotationTolerance = 1e-6;  // a baked node is turned by nothing: only scaled and moved
+
+/// Everything the parts are read from.
+struct BakedFile {
+  const gltf::Document& document;
+  const gltf::BufferBytes& bytes;
+  const BakedHeader& header;
+};
+
+std::string primitive_place(std::size_t mesh, std::size_t i) {
+  return "/meshes/" + std::to_string(mesh) + "/primitives/" + std::to_string(i);
+}
+
+/// Moves one decoded stream of `components` floats to the end of a mesh array. Fails unless it is there and finite.
+class StreamReader {
+ public:
+  StreamReader(DecodedMesh decoded, const gltf::DracoData& draco, std::string place, Findings& findings)
+      : decoded_(std::move(decoded)), draco_(draco), place_(std::move(place)), findings_(findings) {}
+
+  bool has(const std::string& name) const { return draco_.attributes.contains(name); }
+
+  /// The floats of an attribute; zeros of the right number after a fault.
+  std::vector<float> take(const std::string& name, int components) { return take_id(id_of(name), name, components); }
+
+  std::vector<float> take_id(int id, const std::string& name, int components) {
+    const auto found = decoded_.streams.find(static_cast<std::uint32_t>(id));
+    const std::size_t floats = static_cast<std::size_t>(components) * decoded_.vertices;
+    if (id < 0 || found == decoded_.streams.end() || found->second.values.size() != floats) {
+      findings_.fail("attribute_missing", "The compressed geometry lacks the attribute.",
+                     place_ + "/attributes/" + name);
+      return std::vector<float>(floats, 0.0F);
+    }
+    check_finite(found->second.values, name);
+    return found->second.values;
+  }
+
+ private:
+  int id_of(const std::string& name) const {
+    const auto at = draco_.attributes.find(name);
+    return at == draco_.attributes.end() ? -1 : at->second;
+  }
+
+  void check_finite(const std::vector<float>& values, const std::string& name) {
+    const auto bad = std::ranges::find_if(values, [](float v) { return !std::isfinite(v); });
+    if (bad == values.end()) return;
+    findings_.fail("non_finite_geometry", "Float " + std::to_string(bad - values.begin()) + " is not finite.",
+                   place_ + "/attributes/" + name);
+  }
+
+  DecodedMesh decoded_;
+  const gltf::DracoData& draco_;
+  std::string place_;
+  Findings& findings_;
+};
+
+void append(std::vector<Vec2f>& out, const std::vector<float>& f) {
+  for (std::size_t i = 0; i + 1 < f.size(); i += 2) out.push_back({f[i], f[i + 1]});
+}
+void append(std::vector<Vec3f>& out, const std::vector<float>& f) {
+  for (std::size_t i = 0; i + 2 < f.size(); i += 3) out.push_back({f[i], f[i + 1], f[i + 2]});
+}
+void append(std::vector<Vec4f>& out, const std::vector<float>& f) {
+  for (std::size_t i = 0; i + 3 < f.size(); i += 4) out.push_back({f[i], f[i + 1], f[i + 2], f[i + 3]});
+}
+
+/// Decodes primitive `i` of mesh 0 within what its accessors promise.
+DecodedMesh decode_part(const BakedFile& file, std::size_t i, Findings& findings) {
+  const gltf::Primitive& p = file.document.meshes[0].primitives[i];
+  const std::string place = primitive_place(0, i);
+  const int position = p.attribute("POSITION");
+  if (p.draco.view < 0 || position < 0 || p.indices < 0 || p.mode != gltf::Mode::triangles) {
+    findings.fail("not_a_baked_scene", "A baked primitive is an indexed, Draco-compressed triangle list.", place);
+    return {};
+  }
+  const std::uint64_t vertices = file.document.accessors[static_cast<std::size_t>(position)].count;
+  const std::uint64_t indices = file.document.accessors[static_cast<std::size_t>(p.indices)].count;
+  auto decoded = decode_draco(file.bytes.views[static_cast<std::size_t>(p.draco.view)], {vertices, indices / 3});
+  if (!decoded) {
+    findings.fail(decoded.error().code, decoded.error().message, place);
+    return {};
+  }
+  if (decoded->vertices != vertices || decoded->triangles.size() * 3 != indices) {
+    findings.fail("accessor_count_mismatch", "The compressed geometry has other counts than its accessors.", place);
+  }
+  return std::move(*decoded);
+}
+
+/// COLOR_0 of the original scene lies in the same compressed bytes, under the id that scene's primitive names.
+int original_color_id(const BakedFile& file, std::size_t i) {
+  const gltf::DracoData& draco = file.document.meshes[1].primitives[i].draco;
+  const auto at = draco.attributes.find("COLOR_0");
+  return at == draco.attributes.end() ? -1 : at->second;
+}
+
+/// An optional vertex array: values of this part, zeros for the parts before it that have none.
+template <class T>
+void append_optional(std::vector<T>& out, std::size_t first, const std::vector<float>& values) {
+  out.resize(first);
+  append(out, values);
+}
+
+void check_geometry(const Mesh& mesh, std::size_t first, const std::string& place, Findings& findings) {
+  for (std::size_t v = first; v < mesh.position.size(); ++v) {
+    const Vec3f& p = mesh.position[v];
+    if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kCubeHalf) {
+      findings.fail("position_out_of_cube", "Vertex " + std::to_string(v - first) + " is outside the unit cube.",
+                    place);
+    }
+    if (std::abs(length(mesh.normal[v]) - 1) > kUnitTolerance) {
+      findings.fail("normal_not_unit", "The normal of vertex " + std::to_string(v - first) + " has not length 1.",
+                    place);
+    }
+    if (findings.failed()) return;
+  }
+}
+
+void read_coefficients(const BakedFile& file, StreamReader& streams, std::size_t first, std::size_t vertices,
+                       Transfer& out) {
+  out.coefficients.resize((first + vertices) * out.stride());
+  for (std::size_t k = 0; k < slot_vec4s(out.stride()); ++k) {
+    unpack_slots(out, file.header.ranges, k, first, streams.take("_PRT_" + std::to_string(k), 4));
+  }
+}
+
+void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& findings) {
+  DecodedMesh decoded = decode_part(file, i, findings);
+  if (findings.failed()) return;
+  Mesh& mesh = out.scene.mesh;
+  const std::size_t first = mesh.position.size(), vertices = decoded.vertices;
+  for (const Triangle& t : decoded.triangles) {
+    const auto base = static_cast<std::uint32_t>(first);
+    mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+    mesh.part.push_back(static_cast<std::uint32_t>(i));
+  }
+  const std::string place = primitive_place(0, i);
+  StreamReader streams(std::move(decoded), file.document.meshes[0].primitives[i].draco, place, findings);
+  const int color = original_color_id(file, i);
+  const auto& header = file.header.parts[i];
+  const Part part{header.name, header.material,       streams.has("TEXCOORD_0"), streams.has("TEXCOORD_1"),
+                  color >= 0,  streams.has("TANGENT")};
+  append(mesh.position, streams.take("POSITION", 3));
+  append(mesh.normal, streams.take("NORMAL", 3));
+  if (part.has_uv0) append_optional(mesh.uv0, first, streams.take("TEXCOORD_0", 2));
+  if (part.has_uv1) append_optional(mesh.uv1, first, streams.take("TEXCOORD_1", 2));
+  if (part.has_tangent) append_optional(mesh.tangent, first, streams.take("TANGENT", 4));
+  if (part.has_color) append_optional(mesh.color, first, streams.take_id(color, "COLOR_0", 4));
+  read_coefficients(file, streams, first, vertices, out.transfer);
+  check_geometry(mesh, first, place, findings);
+  out.scene.parts.push_back(part);
+}
+
+/// Optional arrays either cover all vertices or are empty.
+void fill_optional(Mesh& mesh) {
+  const std::size_t n = mesh.position.size();
+  if (!mesh.uv0.empty()) mesh.uv0.resize(n);
+  if (!mesh.uv1.empty()) mesh.uv1.resize(n);
+  if (!mesh.color.empty()) mesh.color.resize(n, {1, 1, 1, 1});
+  if (!mesh.tangent.empty()) mesh.tangent.resize(n, {1, 0, 0, 1});
+}
+
+Frame read_frame(const gltf::Document& document, Findings& findings) {
+  const auto& m = document.nodes[static_cast<std::size_t>(document.roots[0])].matrix;
+  const double scale = m[0];
+  double off = 0;
+  for (const std::size_t i : {1u, 2u, 4u, 6u, 8u, 9u}) off = std::max(off, std::abs(m[i]));
+  off = std::max({off, std::abs(m[5] - scale), std::abs(m[10] - scale)});
+  if (!(scale > 0) || !(off <= kRotationTolerance * scale) || !std::isfinite(scale)) {
+    findings.fail("not_a_baked_scene", "The baked node must be moved and scaled evenly, nothing else.", "/nodes/0");
+  }
+  return {{m[12], m[13], m[14]}, scale};
+}
+
+/// A light of the second scene, back in unit-cube lengths.
+Light unit_light(const gltf::Document& document, const gltf::Node& node, const Frame& frame) {
+  Light light = document.lights[static_cast<std::size_t>(node.light)];
+  const auto& m = node.matrix;
+  const double scale = frame.scale;
+  light.position = to_float(frame.to_unit({m[12], m[13], m[14]}));
+  light.direction = to_float(normalized(Vec3d{-m[8], -m[9], -m[10]}));
+  if (light.type != LightType::directional) {
+    light.intensity = to_float(to_double(light.intensity) / (scale * scale));
+    light.range = static_cast<float>(light.range / scale);
+  }
+  return light;
+}
+
+void read_look(const BakedFile& file, Scene& scene) {
+  const gltf::Document& d = file.document;
+  const auto originals = static_cast<std::ptrdiff_t>(d.materials.size() / 2);
+  scene.materials.assign(d.materials.begin(), d.materials.begin() + originals);
+  scene.textures = d.textures;
+  for (const gltf::ImageSource& image : d.images) {
+    Image out{image.name, image.mime, {}, 0, 0, {}};
+    if (image.view >= 0) {
+      const auto bytes = file.bytes.views[static_cast<std::size_t>(image.view)];
+      out.encoded.assign(bytes.begin(), bytes.end());
+    }
+    scene.images.push_back(std::move(out));
+  }
+  for (const gltf::Node& node : d.nodes) {
+    if (node.light >= 0) scene.lights.push_back(unit_light(d, node, scene.frame));
+  }
+}
+
+/// The two scenes mirror each other, and every part names an original material.
+void check_shape(const gltf::Document& d, const BakedHeader& header, Findings& findings) {
+  const bool mirrored = d.meshes.size() == 2 && d.roots.size() == 1 && !d.meshes[0].primitives.empty() &&
+                        d.meshes[0].primitives.size() == d.meshes[1].primitives.size() &&
+                        d.meshes[0].primitives.size() == header.parts.size();
+  if (!mirrored) findings.fail("not_a_baked_scene", "A baked scene has two meshes with one primitive for each part.");
+  for (std::size_t i = 0; i < header.parts.size(); ++i) {
+    const int material = header.parts[i].material;
+    if (material >= 0 && static_cast<std::size_t>(material) < d.materials.size() / 2) continue;
+    findings.fail("index_out_of_range", "The part names a material that is not there.", primitive_place(0, i));
+  }
+}
+
+BakedScene read_scene(const BakedFile& file, Findings& findings) {
+  BakedScene out;
+  out.transfer = file.header.shape;
+  out.light = file.header.light;
+  out.exposure = file.header.exposure;
+  out.provenance = file.header.provenance;
+  out.scene.frame = read_frame(file.document, findings);
+  for (std::size_t i = 0; i < file.header.parts.size() && !findings.failed(); ++i) read_part(file, i, out, findings);
+  if (findings.failed()) return out;
+  fill_optional(out.scene.mesh);
+  if (!std::ranges::all_of(out.transfer.coefficients, [](float c) { return std::isfinite(c); })) {
+    findings.fail("number_out_of_range", "A coefficient does not fit a float.");
+  }
+  read_look(file, out.scene);
+  return out;
+}
+
+BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
+  const GltfContainer container = open_glb(file, findings);
+  if (findings.failed()) return {};
+  scan_json(container.json, {}, findings);
+  if (findings.failed()) return {};
+  const BakedHeader header = read_baked_header(container.json, findings);
+  if (findings.failed()) return {};
+  const gltf::Document document = gltf::parse_document(container.json, findings);
+  if (!findings.failed()) gltf::check_document(document, findings);
+  if (!findings.failed()) check_shape(document, header, findings);
+  if (findings.failed()) return {};
+  const gltf::BufferBytes bytes = gltf::load_bytes(document, container, {}, {}, findings);
+  if (findings.failed()) return {};
+  return read_scene({document, bytes, header}, findings);
+}
+
+}  // namespace
+
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file) {
+  Findings findings("scene.glb");
+  BakedScene out = read_file(file, findings);
+  if (findings.failed()) return tl::make_unexpected(findings.fault());
+  return out;
+}
+
+}  // namespace kiln
