@@ -243,6 +243,7 @@ Result<StoredBlob> BlobStore::publish(const fs::path& tmp, const std::string& sh
 
 Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
   const int fd = files_->open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  if (fd < 0 && (errno == ENOENT || errno == ELOOP)) return fault("not_found", "there is no such result");
   if (fd < 0) return io_fault(errno, "open a result");
   struct stat status {};
   const bool regular = ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
@@ -253,7 +254,7 @@ Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
                                            hash.update(piece);
                                            bytes += piece.size();
                                          })
-                              : Result<void>(fault("io_failed", "a result is not a regular file"));
+                              : Result<void>(fault("not_found", "there is no such result: not a regular file"));
   if (done && files_->fsync(fd) != 0) done = io_fault(errno, "make a result durable");
   files_->close(fd);
   if (!done) return tl::make_unexpected(done.error());

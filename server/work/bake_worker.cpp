@@ -1,0 +1,195 @@
+#include "server/work/bake_worker.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <new>
+#include <thread>
+
+#include "core/bake/bake.h"
+#include "core/base/threads.h"
+#include "server/work/worker_protocol.h"
+
+namespace kiln {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kTellEvery = std::chrono::milliseconds(50);
+
+/// A trouble that ends the job with a fault of its own, from deep within file handling.
+struct WorkerTrouble {
+  Fault fault;
+};
+
+void write_all(int fd, const void* data, std::size_t size) {
+  for (const auto* bytes = static_cast<const char*>(data); size > 0;) {
+    const ssize_t put = ::write(fd, bytes, size);
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0 && errno == ENOSPC) throw WorkerTrouble{{"disk_full", "the disk of the server is full", ""}};
+    if (put < 0) throw WorkerTrouble{{"internal", "the worker could not write", ""}};
+    bytes += put;
+    size -= static_cast<std::size_t>(put);
+  }
+}
+
+void tell(const WorkerLine& line) {
+  const std::string text = line_json(line);
+  write_all(kWorkerPipe, text.data(), text.size());
+}
+
+Bytes read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
+  Bytes bytes(static_cast<std::size_t>(in.tellg()));
+  in.seekg(0);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!in) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
+  return bytes;
+}
+
+void write_file(const std::string& path, const void* data, std::size_t size) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (fd < 0) throw WorkerTrouble{{errno == ENOSPC ? "disk_full" : "internal", "the worker could not write", ""}};
+  write_all(fd, data, size);
+  ::close(fd);
+}
+
+WorkerOrder read_order() {
+  const Bytes text = read_file("job.json");
+  auto order = parse_order({reinterpret_cast<const char*>(text.data()), text.size()});
+  if (!order) throw WorkerTrouble{order.error()};
+  return *order;
+}
+
+BakeInput read_input(const WorkerOrder& order) {
+  auto recipe = parse_recipe(order.recipe);
+  if (!recipe) throw WorkerTrouble{{"internal", "the worker did not understand its recipe", ""}};
+  BakeInput input;
+  input.recipe = std::move(*recipe);
+  std::size_t place = 0;
+  input.scene.name = order.inputs.scene.name;
+  input.scene.main = read_file(input_path(place));
+  for (const NamedBlob& file : order.inputs.resources) {
+    input.scene.resources[file.name] = read_file(input_path(++place));
+  }
+  if (order.inputs.environment) {
+    input.environment_name = order.inputs.environment->name;
+    input.environment = read_file(input_path(++place));
+  }
+  return input;
+}
+
+/// Stops `threads` on TERM, which every thread of this process blocks.
+class TermWatch {
+ public:
+  explicit TermWatch(Threads& threads)
+      : thread_([this, &threads] {
+          for (int received = 0; ::sigwait(&set(), &received) == 0 && !over_;) threads.stop();
+        }) {}
+  ~TermWatch() {
+    over_ = true;
+    ::pthread_kill(thread_.native_handle(), SIGTERM);
+    thread_.join();
+  }
+  TermWatch(const TermWatch&) = delete;
+  TermWatch& operator=(const TermWatch&) = delete;
+
+  static const sigset_t& set() {
+    static const sigset_t term = [] {
+      sigset_t s;
+      sigemptyset(&s);
+      sigaddset(&s, SIGTERM);
+      return s;
+    }();
+    return term;
+  }
+
+ private:
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+Progress progress_to_pipe() {
+  return [told = Clock::time_point{}, stage = std::string()](const ProgressEvent& event) mutable {
+    const auto now = Clock::now();
+    if (event.stage == stage && now - told < kTellEvery) return;
+    told = now;
+    stage = event.stage;
+    tell(event);
+  };
+}
+
+int refuse(const Fault& fault) {
+  tell(fault);
+  return kExitRefused;
+}
+
+int make_plan(const BakeInput& input, Threads& threads) {
+  const auto plan = plan_json(input, threads);
+  if (!plan) return refuse(plan.error());
+  write_file("out/plan.json", plan->data(), plan->size());
+  tell(WorkerDone{});
+  return kExitDone;
+}
+
+int make_bake(const BakeInput& input, Threads& threads) {
+  const auto output = bake(input, progress_to_pipe(), threads);
+  if (!output) return refuse(output.error());
+  for (const ArtifactFile& file : output->files) {
+    write_file("out/" + file.name, file.bytes.data(), file.bytes.size());
+    tell(WorkerArtifact{file.name, file.media_type});
+  }
+  tell(WorkerDone{});
+  return kExitDone;
+}
+
+/// Dies with the supervisor, also when that was gone before the request reached the kernel.
+void tie_to_parent(int parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) std::_Exit(kExitCanceled);
+}
+
+int run_order() {
+  const WorkerOrder order = read_order();
+  tie_to_parent(order.parent);
+  Threads threads(order.threads);
+  const TermWatch watch(threads);
+  const BakeInput input = read_input(order);
+  return order.mode == WorkerMode::plan ? make_plan(input, threads) : make_bake(input, threads);
+}
+
+int failed(const Fault& fault) try {
+  tell(fault);
+  return kExitInternal;
+} catch (...) {
+  return kExitInternal;  // the supervisor is gone
+}
+
+}  // namespace
+
+int bake_worker_main(int argc, char** argv) try {
+  ::pthread_sigmask(SIG_BLOCK, &TermWatch::set(), nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
+  ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+  if (argc != 3 || ::chdir(argv[2]) != 0) return kExitInternal;
+  return run_order();
+} catch (const Cancelled&) {
+  return kExitCanceled;
+} catch (const WorkerTrouble& trouble) {
+  return failed(trouble.fault);
+} catch (const std::bad_alloc&) {
+  return failed({"out_of_memory", "the job needed more memory than its limit allows", "/limits/memory_mb"});
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());  // to worker.log, for us alone
+  return failed({"internal", "the bake failed by a fault of the program", ""});
+}
+
+}  // namespace kiln

@@ -1,0 +1,80 @@
+#include "server/work/housekeeping.h"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace kiln {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Millis kReapEvery{5000};
+constexpr double kPartialAgeS = 24 * 3600;
+
+/// Files whose row never came to be. Their age is the file's own.
+Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
+  std::vector<std::string> old;
+  const auto before = std::filesystem::file_time_type::clock::now() - grace;
+  place.blobs.for_each([&](const std::string& sha256, std::uint64_t) {
+    std::error_code gone;
+    const auto written = std::filesystem::last_write_time(place.blobs.path_of(sha256), gone);
+    if (!gone && written < before) old.push_back(sha256);
+  });
+  int removed = 0;
+  for (const std::string& sha256 : old) {
+    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(known, place.store.knows_blob(sha256));
+    if (!known && place.blobs.remove(sha256)) ++removed;
+  }
+  return removed;
+}
+
+}  // namespace
+
+Result<int> collect_unused_blobs(const WorkPlace& place, Millis grace) {
+  int removed = 0;
+  {
+    // Reference and removal meet here: an upload of the same bytes waits, and then writes them anew.
+    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(unused, place.store.forget_unused_blobs(grace));
+    for (const std::string& sha256 : unused) {
+      if (place.blobs.remove(sha256)) ++removed;
+    }
+  }
+  KILN_TRY(orphans, collect_orphans(place, grace));
+  return removed + orphans;
+}
+
+void Housekeeping::start() {
+  thread_ = std::thread([this] { work(); });
+}
+
+void Housekeeping::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void Housekeeping::work() {
+  const Millis collect_every = std::clamp(grace_ / 20, Millis(1000), Millis(600'000));
+  auto collected = Clock::now();
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, std::min(kReapEvery, collect_every), [&] { return stopping_; })) {
+    lock.unlock();
+    if (const auto reaped = place_.store.reap(); reaped && *reaped > 0) {
+      place_.counters.reaped += static_cast<std::uint64_t>(*reaped);
+      place_.bus.announce();
+    }
+    if (Clock::now() - collected >= collect_every) {
+      collected = Clock::now();
+      static_cast<void>(collect_unused_blobs(place_, grace_));  // a full disk now: the next round tries again
+      place_.blobs.expire_partials(kPartialAgeS);
+    }
+    lock.lock();
+  }
+}
+
+}  // namespace kiln

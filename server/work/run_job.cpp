@@ -1,0 +1,255 @@
+#include "server/work/run_job.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "core/bake/recipe.h"
+#include "server/jobs/ids.h"
+#include "server/work/work_folder.h"
+
+namespace kiln {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Kind = WorkerOutcome::Kind;
+
+constexpr auto kStoreProgressEvery = std::chrono::seconds(5);
+constexpr auto kShowProgressEvery = std::chrono::milliseconds(50);
+constexpr double kPlanWallS = 60;
+
+int status_of(Kind kind) {
+  const bool own_fault = kind == Kind::refused || kind == Kind::out_of_memory || kind == Kind::timed_out;
+  return own_fault ? 422 : 500;
+}
+
+/// The recipe was canonical when it was stored: a fault here is ours.
+Limits limits_of(const std::string& recipe) {
+  const auto parsed = parse_recipe(recipe);
+  return parsed ? parsed->limits : Limits{};
+}
+
+WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const Limits& limits, int threads) {
+  WorkerOrder order;
+  order.inputs = inputs;
+  order.recipe = recipe;
+  order.threads = limits.threads > 0 ? limits.threads : threads;
+  order.parent = static_cast<int>(::getpid());
+  return order;
+}
+
+/// Progress and heartbeats of one run.
+class Pulse {
+ public:
+  Pulse(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {}
+
+  void progress(const ProgressEvent& event) {
+    const auto now = Clock::now();
+    const bool new_stage = event.stage != newest_.stage;
+    newest_ = {event.stage, event.done, event.total, std::max(newest_.fraction, event.fraction), {}};
+    const double elapsed = std::chrono::duration<double>(now - started_).count();
+    if (newest_.fraction > 0.01) newest_.eta_s = elapsed * (1 - newest_.fraction) / newest_.fraction;
+    if (!new_stage && now - shown_ < kShowProgressEvery) return;
+    shown_ = now;
+    place_.bus.announce_progress(claim_.ref.job_id, newest_);
+  }
+
+  void tick() {
+    const auto now = Clock::now();
+    if (now - beaten_ < kStoreProgressEvery) return;
+    beaten_ = now;
+    const auto beat = place_.store.heartbeat(claim_.ref, kLease, newest_);
+    if (!beat) return;  // the lease still holds for a while: try again
+    if (*beat == Beat::lost) stop_.ask(StopReason::lost);
+    if (*beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
+  }
+
+ private:
+  const Claim& claim_;
+  StopSignal& stop_;
+  const WorkPlace& place_;
+  const Clock::time_point started_ = Clock::now();
+  Clock::time_point shown_{}, beaten_ = Clock::now();
+  JobProgress newest_;
+};
+
+/// Tries again while the store cannot write, as long as the claim may hold; the queue waits meanwhile.
+template <class Write>
+Result<Wrote> persist(const StopSignal& stop, Write&& write) {
+  const auto deadline = Clock::now() + kLease;
+  for (Millis pause{100};; pause = std::min(pause * 2, Millis(2000))) {
+    Result<Wrote> wrote = write();
+    if (wrote || Clock::now() > deadline || stop.asked() == StopReason::drain) return wrote;
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+class JobRun {
+ public:
+  JobRun(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {}
+
+  void run() {
+    const auto known = claim_.job.force ? std::vector<Artifact>{} : known_result();
+    if (!known.empty()) {
+      succeed(known, true);
+    } else {
+      conclude();
+    }
+    place_.bus.end_progress(claim_.ref.job_id);
+    place_.bus.announce();
+  }
+
+ private:
+  /// A twin may have finished while this job waited.
+  std::vector<Artifact> known_result() const {
+    return place_.store.find_result(claim_.job.content_key).value_or(std::vector<Artifact>{});
+  }
+
+  void conclude() {
+    const Limits limits = limits_of(claim_.job.recipe);
+    const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
+    const auto folder = WorkFolder::make(
+        path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, limits, place_.options.threads));
+    if (!folder) return after_trouble(folder.error());
+    end_as(bake(*folder, limits), *folder);
+  }
+
+  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits) {
+    Pulse pulse(claim_, stop_, place_);
+    const std::uint64_t memory = limits.memory_mb << 20;
+    return run_worker({place_.options.worker_command, folder.path(), memory}, {memory, limits.wall_s}, stop_,
+                      {[&](const ProgressEvent& event) { pulse.progress(event); }, [&] { pulse.tick(); }});
+  }
+
+  void end_as(const WorkerOutcome& outcome, const WorkFolder& folder) {
+    switch (outcome.kind) {
+      case Kind::done:
+        return store_results(outcome, folder);
+      case Kind::stopped:
+        return after_stop();
+      case Kind::trouble:
+        return after_trouble(outcome.fault);
+      case Kind::crashed:
+        return after_crash(outcome.fault);
+      case Kind::out_of_memory:
+        ++place_.counters.deaths_memory;
+        break;
+      case Kind::timed_out:
+        ++place_.counters.deaths_timeout;
+        break;
+      case Kind::refused:
+      case Kind::internal:
+        break;
+    }
+    fail({outcome.fault, status_of(outcome.kind)});
+  }
+
+  void store_results(const WorkerOutcome& outcome, const WorkFolder& folder) {
+    const std::shared_lock gate(place_.blob_gate);
+    std::vector<Artifact> artifacts;
+    for (const WorkerArtifact& named : outcome.artifacts) {
+      const auto stored = place_.blobs.adopt(folder.result(named.name));
+      if (!stored && stored.error().code == "not_found") {
+        return fail({{"internal", "the worker named a result that it did not make", ""}, 500});
+      }
+      if (!stored) return after_trouble(stored.error());
+      artifacts.push_back({named.name, named.media_type, stored->sha256, stored->bytes});
+    }
+    if (artifacts.empty()) return fail({{"internal", "the worker made no result", ""}, 500});
+    succeed(artifacts, false);
+  }
+
+  void succeed(const std::vector<Artifact>& artifacts, bool cached) {
+    if (!wrote(persist(stop_, [&] { return place_.store.commit(claim_.ref, artifacts, cached); }))) return;
+    ++place_.counters.succeeded;
+    if (cached) ++place_.counters.cached;
+  }
+
+  void fail(const JobError& error) {
+    if (wrote(persist(stop_, [&] { return place_.store.fail(claim_.ref, error); }))) ++place_.counters.failed;
+  }
+
+  void after_stop() {
+    if (stop_.asked() == StopReason::lost) return;
+    if (stop_.asked() == StopReason::drain) {
+      static_cast<void>(wrote(place_.store.release(claim_.ref)));  // else the next start finds and requeues it
+    } else {
+      finish_cancel();
+    }
+  }
+
+  void after_crash(const Fault& fault) {
+    ++place_.counters.deaths_signal;
+    if (claim_.job.crashes + 1 >= kMaxCrashes) return fail({fault, 500});
+    retry({fault.message, true, Millis(0)});
+  }
+
+  void after_trouble(const Fault& fault) {
+    if (claim_.job.retries >= kMaxRetries || fault.code == "asset_lost") {
+      return fail({fault, fault.code == "disk_full" ? 507 : 500});
+    }
+    std::random_device device;
+    const double jitter = std::uniform_real_distribution(0.0, 1.0)(device);
+    retry({fault.message, false, retry_delay(place_.options.first_retry, claim_.job.retries, jitter)});
+  }
+
+  void retry(const Retry& how) {
+    if (wrote(persist(stop_, [&] { return place_.store.retry(claim_.ref, how); }))) ++place_.counters.retried;
+  }
+
+  /// False when nothing was written: canceled meanwhile, fenced off, or the store is out of order.
+  bool wrote(const Result<Wrote>& result) {
+    if (result && *result == Wrote::done) return true;
+    if (result) finish_cancel();
+    return false;
+  }
+
+  void finish_cancel() {
+    const auto ended = persist(stop_, [&] { return place_.store.finish_cancel(claim_.ref); });
+    if (!ended) return;
+    ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);
+  }
+
+  const Claim& claim_;
+  StopSignal& stop_;
+  const WorkPlace& place_;
+};
+
+Result<std::string> read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream text;
+  text << in.rdbuf();
+  if (!in) return fault("internal", "the worker made no plan");
+  return text.str();
+}
+
+}  // namespace
+
+Millis retry_delay(Millis first, int retries, double jitter) {
+  constexpr double kMostMs = 3'600'000;
+  const double delay = static_cast<double>(first.count()) * std::pow(4.0, retries) * (1 + 0.25 * jitter);
+  return Millis(static_cast<std::int64_t>(std::min(delay, kMostMs)));
+}
+
+void run_job(const Claim& claim, StopSignal& stop, const WorkPlace& place) { JobRun(claim, stop, place).run(); }
+
+Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe, const StopSignal& stop,
+                             const WorkPlace& place) {
+  const Limits limits = limits_of(recipe);
+  WorkerOrder order = order_of(inputs, recipe, limits, place.options.threads);
+  order.mode = WorkerMode::plan;
+  KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
+  const std::uint64_t memory = limits.memory_mb << 20;
+  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory},
+                                           {memory, std::min(limits.wall_s, kPlanWallS)}, stop, {});
+  if (outcome.kind == Kind::done) return read_text(folder.result("plan.json"));
+  if (outcome.kind == Kind::stopped) return fault("draining", "the server stops");
+  return tl::make_unexpected(outcome.fault);
+}
+
+}  // namespace kiln

@@ -1,0 +1,325 @@
+#include "server/work/service.h"
+
+#include <algorithm>
+#include <atomic>
+#include <shared_mutex>
+#include <thread>
+
+#include "core/base/sha256.h"
+#include "server/jobs/sqlite_store.h"
+#include "server/work/content_key.h"
+#include "server/work/data_folder.h"
+#include "server/work/event_stream.h"
+#include "server/work/housekeeping.h"
+#include "server/work/supervisor.h"
+#include "server/work/work_folder.h"
+
+namespace kiln {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kPlansAtOnce = 2;
+constexpr Millis kRemoveWait{5000};  // for a running job to end; TERM and KILL take half a second
+
+tl::unexpected<Fault> draining() { return fault("draining", "the server stops; try again in a moment"); }
+
+/// All files of a submission, in their places.
+Result<JobInputs> inputs_of(const Submission& submission) {
+  JobInputs inputs;
+  inputs.scene = {submission.scene_name,
+                  submission.scene_sha256.empty() ? submission.recipe.scene_asset : submission.scene_sha256};
+  inputs.resources = submission.resources;
+  const EnvironmentChoice& sky = submission.recipe.environment;
+  if (sky.kind == EnvironmentChoice::Kind::asset) {
+    inputs.environment = {submission.environment_name.empty() ? sky.name : submission.environment_name, sky.name};
+  }
+  if (sky.kind == EnvironmentChoice::Kind::file) {
+    return fault("environment_file", "a server reads no files of its own: upload the environment as an asset",
+                 "/environment/file");
+  }
+  if (inputs.scene.sha256.empty()) return fault("asset_not_found", "the job names no scene", "/scene/asset");
+  return inputs;
+}
+
+std::vector<NamedBlob> all_files(const JobInputs& inputs) {
+  std::vector<NamedBlob> files = inputs.resources;
+  files.push_back(inputs.scene);
+  if (inputs.environment) files.push_back(*inputs.environment);
+  return files;
+}
+
+std::string hash_of(const std::string& text) {
+  return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+/// Everything a request says, so that an idempotency key means one request.
+std::string request_hash(const NewJob& job) {
+  return hash_of(job.content_key + "\n" + job.recipe + "\n" + job.inputs.scene.name + (job.force ? "\nforce" : ""));
+}
+
+}  // namespace
+
+/// The parts, in the order of their lives: each may use those above it.
+class LocalService final : public Service {
+ public:
+  LocalService(ServiceOptions options, DataLock lock, std::unique_ptr<JobStore> store, std::unique_ptr<BlobStore> blobs)
+      : options_(std::move(options)), lock_(std::move(lock)), store_(std::move(store)), blobs_(std::move(blobs)) {}
+  ~LocalService() override { drain(); }
+
+  void start() override {
+    supervisor_.start();
+    housekeeping_.start();
+  }
+  void drain() override;
+
+  Result<Created> submit(const Submission&) override;
+  Result<std::string> plan(const Submission&) override;
+
+  Result<Job> get(const std::string& id) override;
+  Result<JobPage> list(const JobQuery&) override;
+  Result<Job> cancel(const std::string& id) override;
+  Result<void> remove(const std::string& id) override;
+  Result<Job> wait_change(const std::string& id, std::uint64_t version, Millis timeout) override {
+    return wait_until(id, timeout, [&](const Job& job) { return job.version != version; });
+  }
+  Result<Job> wait_done(const std::string& id, Millis timeout) override {
+    return wait_until(id, timeout, [](const Job& job) { return is_terminal(job.state); });
+  }
+
+  Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
+                                                 std::optional<std::uint64_t> after) override;
+
+  Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
+  Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
+  bool has_asset(const std::string& sha256) override;
+  std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
+  Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
+
+  ServiceStats stats() override;
+  std::vector<std::string> unready_reasons() override;
+
+ private:
+  friend class LocalUpload;
+  template <class Condition>
+  Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
+  void overlay_progress(Job&) const;
+  bool may_claim() const { return disk_space(options_.data).free_fraction >= options_.hard_free_fraction; }
+  WorkPlace place() { return {*store_, *blobs_, bus_, blob_gate_, counters_, work_options_}; }
+  WorkOptions work_options() const;
+
+  const ServiceOptions options_;
+  DataLock lock_;
+  std::unique_ptr<JobStore> store_;
+  std::unique_ptr<BlobStore> blobs_;
+  EventBus bus_;
+  std::shared_mutex blob_gate_;
+  WorkCounters counters_;
+  const WorkOptions work_options_ = work_options();
+  StopSignal plans_stop_;
+  std::atomic<int> plans_{0};
+  Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
+  Housekeeping housekeeping_{place(), options_.blob_grace};
+};
+
+class LocalUpload final : public AssetUpload {
+ public:
+  LocalUpload(LocalService& service, BlobWriter writer) : service_(&service), writer_(std::move(writer)) {}
+
+  Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
+  std::uint64_t bytes() const override { return writer_.bytes(); }
+  Result<StoredBlob> finish() override {
+    const std::shared_lock gate(service_->blob_gate_);
+    KILN_TRY(stored, writer_.finish());
+    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes);
+    if (!noted) return tl::make_unexpected(noted.error());
+    service_->counters_.bytes_uploaded += stored.bytes;
+    return stored;
+  }
+
+ private:
+  LocalService* service_;
+  BlobWriter writer_;
+};
+
+WorkOptions LocalService::work_options() const {
+  const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
+  return {options_.data / "work", options_.worker_command, threads, options_.first_retry};
+}
+
+void LocalService::drain() {
+  bus_.close();
+  plans_stop_.ask(StopReason::drain);
+  supervisor_.stop();
+  housekeeping_.stop();
+  while (plans_ > 0) std::this_thread::sleep_for(Millis(5));
+}
+
+Result<Created> LocalService::submit(const Submission& submission) {
+  if (bus_.closed()) return draining();
+  KILN_TRY(inputs, inputs_of(submission));
+  NewJob job;
+  job.label = submission.recipe.label;
+  job.recipe = recipe_json(submission.recipe);
+  job.content_key = content_key(inputs, submission.recipe);
+  job.inputs = std::move(inputs);
+  job.force = submission.force;
+  job.idempotency_key = submission.idempotency_key;
+  job.max_queued = options_.max_queued;
+  job.request_hash = request_hash(job);
+  KILN_TRY(created, store_->create(job));
+  supervisor_.wake();
+  bus_.announce();
+  return created;
+}
+
+Result<std::string> LocalService::plan(const Submission& submission) {
+  if (bus_.closed()) return draining();
+  KILN_TRY(inputs, inputs_of(submission));
+  struct Place {
+    std::atomic<int>& taken;
+    const int others = taken++;
+    ~Place() { --taken; }
+  } place_among{plans_};
+  if (place_among.others >= kPlansAtOnce)
+    return fault("plan_busy", "other plans are being made; try again in a moment");
+  for (const NamedBlob& file : all_files(inputs)) {
+    if (!has_asset(file.sha256)) return fault("asset_not_found", "no asset has this SHA-256", file.sha256);
+  }
+  return run_plan(inputs, recipe_json(submission.recipe), plans_stop_, place());
+}
+
+void LocalService::overlay_progress(Job& job) const {
+  if (job.state != JobState::running) return;
+  if (auto live = bus_.progress_of(job.id)) job.progress = std::move(live);
+}
+
+Result<Job> LocalService::get(const std::string& id) {
+  KILN_TRY(job, store_->get(id));
+  overlay_progress(job);
+  return job;
+}
+
+Result<JobPage> LocalService::list(const JobQuery& query) {
+  KILN_TRY(page, store_->list(query));
+  for (Job& job : page.jobs) overlay_progress(job);
+  return page;
+}
+
+Result<Job> LocalService::cancel(const std::string& id) {
+  KILN_TRY(job, store_->cancel(id));
+  supervisor_.cancel(id);
+  bus_.announce();
+  return job;
+}
+
+Result<void> LocalService::remove(const std::string& id) {
+  KILN_TRY(job, cancel(id));
+  if (!is_terminal(job.state)) {
+    KILN_TRY(ended, wait_done(id, kRemoveWait));
+    job = std::move(ended);
+  }
+  return store_->remove(id);
+}
+
+template <class Condition>
+Result<Job> LocalService::wait_until(const std::string& id, Millis timeout, Condition&& reached) {
+  const auto deadline = Clock::now() + timeout;
+  while (true) {
+    const std::uint64_t seen = bus_.ticks();
+    KILN_TRY(job, get(id));
+    if (reached(job) || !bus_.wait(seen, deadline)) return job;
+  }
+}
+
+Result<std::unique_ptr<EventStream>> LocalService::subscribe(const std::string& job_id,
+                                                             std::optional<std::uint64_t> after) {
+  if (!job_id.empty()) {
+    KILN_TRY(job, store_->get(job_id));
+    static_cast<void>(job);
+  }
+  KILN_TRY(last, store_->last_event_id());
+  return std::make_unique<StoredEventStream>(*store_, bus_, job_id, after.value_or(last));
+}
+
+Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const std::string& name) {
+  KILN_TRY(job, store_->get(id));
+  const auto found = std::ranges::find(job.artifacts, name, &Artifact::name);
+  if (found == job.artifacts.end()) return fault("not_found", "the job has no such artefact");
+  KILN_TRY(reader, blobs_->open_blob(found->sha256));
+  return OpenArtifact{*found, std::move(reader)};
+}
+
+Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
+  if (bus_.closed()) return draining();
+  const DiskSpace disk = disk_space(options_.data);
+  if (disk.free_fraction < options_.soft_free_fraction || disk.free_bytes < request.expected) {
+    return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
+  }
+  KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
+  return std::make_unique<LocalUpload>(*this, std::move(writer));
+}
+
+bool LocalService::has_asset(const std::string& sha256) {
+  // The row decides: a file without one may be on its way out. Asking keeps the blob for another grace.
+  const std::shared_lock gate(blob_gate_);
+  if (!store_->knows_blob(sha256).value_or(false)) return false;
+  const auto reader = blobs_->open_blob(sha256);
+  return reader && store_->touch_blob(sha256, reader->size()).has_value();
+}
+
+ServiceStats LocalService::stats() {
+  ServiceStats stats;
+  stats.jobs = store_->counts().value_or(StoreCounts{});
+  stats.claimed = counters_.claimed;
+  stats.succeeded = counters_.succeeded;
+  stats.failed = counters_.failed;
+  stats.canceled = counters_.canceled;
+  stats.cached = counters_.cached;
+  stats.retried = counters_.retried;
+  stats.reaped = counters_.reaped;
+  stats.stale_commits = counters_.stale_commits;
+  stats.deaths_signal = counters_.deaths_signal;
+  stats.deaths_memory = counters_.deaths_memory;
+  stats.deaths_timeout = counters_.deaths_timeout;
+  stats.bytes_uploaded = counters_.bytes_uploaded;
+  stats.claim_latency_s_sum = static_cast<double>(counters_.claim_latency_ms) / 1000;
+  const DiskSpace disk = disk_space(options_.data);
+  stats.free_fraction = disk.free_fraction;
+  stats.free_bytes = disk.free_bytes;
+  return stats;
+}
+
+std::vector<std::string> LocalService::unready_reasons() {
+  std::vector<std::string> reasons;
+  if (bus_.closed()) reasons.emplace_back("the server stops");
+  if (const auto writable = store_->check_writable(); !writable) reasons.push_back(writable.error().message);
+  if (const auto probe = blobs_->write(); !probe) reasons.push_back(probe.error().message);
+  const double free = disk_space(options_.data).free_fraction;
+  if (free < options_.hard_free_fraction) {
+    reasons.emplace_back("the disk is nearly full: jobs wait");
+  } else if (free < options_.soft_free_fraction) {
+    reasons.emplace_back("the disk is nearly full: uploads are refused");
+  }
+  return reasons;
+}
+
+Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
+  ServiceOptions options = given;
+  options.data = std::filesystem::absolute(given.data);
+  KILN_TRY(lock, DataLock::take(options.data));
+  KILN_TRY(store, open_sqlite_store({options.data / "kiln.db", {}}));
+  KILN_TRY(blobs, BlobStore::open(options.data));
+  std::error_code error;
+  std::filesystem::create_directories(options.data / "work", error);
+  if (error) return fault("io_failed", "the work folder cannot be made");
+  // What an earlier server left behind: its workers died with it.
+  remove_work_folders(options.data / "work");
+  blobs->remove_dead_writers();
+  KILN_TRY(requeued, store->reap(true));
+  static_cast<void>(requeued);
+  return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
+}
+
+}  // namespace kiln

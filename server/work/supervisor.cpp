@@ -1,0 +1,92 @@
+#include "server/work/supervisor.h"
+
+#include <algorithm>
+
+namespace kiln {
+namespace {
+
+constexpr Millis kLongestRest{2000};  // wake() is the fast way; this is the truth
+
+}  // namespace
+
+Supervisor::Supervisor(WorkPlace place, int workers, std::function<bool()> may_claim)
+    : place_(place), workers_(workers), may_claim_(std::move(may_claim)) {}
+
+Supervisor::~Supervisor() { stop(); }
+
+void Supervisor::start() {
+  for (int i = 0; i < workers_; ++i) threads_.emplace_back([this] { work(); });
+}
+
+void Supervisor::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    for (const auto& [id, signal] : running_) signal->ask(StopReason::drain);
+    changed_.notify_all();
+  }
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+void Supervisor::wake() {
+  const std::lock_guard lock(mutex_);
+  ++wakes_;
+  changed_.notify_all();
+}
+
+void Supervisor::cancel(const std::string& job_id) {
+  const std::lock_guard lock(mutex_);
+  const auto found = running_.find(job_id);
+  if (found != running_.end()) found->second->ask(StopReason::cancel);
+}
+
+int Supervisor::busy() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<int>(running_.size());
+}
+
+void Supervisor::work() {
+  while (true) {
+    std::uint64_t seen = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return;
+      seen = wakes_;
+    }
+    const auto claim = may_claim_() ? place_.store.claim(kLease) : Result<std::optional<Claim>>(std::nullopt);
+    if (claim && *claim) {
+      run(**claim);
+    } else {
+      rest(seen);
+    }
+  }
+}
+
+void Supervisor::run(const Claim& claim) {
+  const auto signal = std::make_shared<StopSignal>();
+  {
+    const std::lock_guard lock(mutex_);
+    running_[claim.ref.job_id] = signal;
+    if (stopping_) signal->ask(StopReason::drain);
+  }
+  // Asked for between the claim and the entry above: nobody could tell this worker.
+  const auto job = place_.store.get(claim.ref.job_id);
+  if (job && job->cancel_requested) signal->ask(StopReason::cancel);
+  ++place_.counters.claimed;
+  place_.counters.claim_latency_ms += claim.job.started_ms - claim.job.created_ms;
+  place_.bus.announce();
+  run_job(claim, *signal, place_);
+  const std::lock_guard lock(mutex_);
+  running_.erase(claim.ref.job_id);
+}
+
+void Supervisor::rest(std::uint64_t seen) {
+  const auto due = place_.store.next_due().value_or(std::nullopt).value_or(kLongestRest);
+  // A job that is due already but was not taken waits for the disk or the store: no spinning.
+  const Millis pause = std::clamp(due, Millis(200), kLongestRest);
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, pause, [&] { return stopping_ || wakes_ != seen; });
+}
+
+}  // namespace kiln

@@ -1,0 +1,50 @@
+#pragma once
+// Takes jobs from the queue and keeps so many workers busy.
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/work/run_job.h"
+
+namespace kiln {
+
+/// One thread for each worker: it claims, starts a process, watches it, writes the end. Idle threads wait for wake().
+class Supervisor {
+ public:
+  /// `may_claim` is asked before each claim: false while the disk is nearly full.
+  Supervisor(WorkPlace place, int workers, std::function<bool()> may_claim);
+  ~Supervisor();
+
+  void start();
+  /// Ends all workers; their jobs go back to the queue. Returns when no process is left.
+  void stop();
+
+  /// There may be work.
+  void wake();
+  /// Ends the worker of this job, if it has one here.
+  void cancel(const std::string& job_id);
+  int busy() const;
+
+ private:
+  void work();
+  void run(const Claim&);
+  void rest(std::uint64_t seen);  // until wake() was called after `seen` wakes, a job is due, or two seconds passed
+
+  WorkPlace place_;
+  int workers_;
+  std::function<bool()> may_claim_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t wakes_ = 0;
+  bool stopping_ = false;
+  std::map<std::string, std::shared_ptr<StopSignal>> running_;  // by job id
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace kiln
