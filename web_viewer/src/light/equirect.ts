@@ -1,0 +1,92 @@
+// Equirectangular radiance maps and spherical harmonics, conventions of core/scene/environment.h:
+//   u = 0.5 + atan2(z, x) / (2 pi),   v from the top = 0.5 - asin(y) / pi
+
+import { accumulate, evaluateSh, lightAlong, shCount } from './sh';
+
+/// Rows from the top; `stride` numbers per texel, the first three are R, G, B.
+export interface EquirectMap {
+  width: number;
+  height: number;
+  stride: 3 | 4;
+  data: Float32Array;
+}
+
+export interface Direction {
+  x: number;
+  y: number;
+  z: number;
+}
+
+export function directionAt(u: number, v: number): Direction {
+  const azimuth = 2 * Math.PI * (u - 0.5);
+  const height = Math.PI * (0.5 - v);
+  const radius = Math.cos(height);
+  return { x: radius * Math.cos(azimuth), y: Math.sin(height), z: radius * Math.sin(azimuth) };
+}
+
+/// Texels this many or more across are taken as constant at their centre; coarser maps are sampled several times each.
+const kFineWidth = 512;
+
+/// SH coefficients of a map. Each sample counts with its exact solid angle, so that a constant map of radiance 1 gives
+/// exactly sqrt(4 pi) in band 0. Cost: width * height * order^2.
+export function projectEquirect(map: EquirectMap, order: number): Float32Array {
+  const split = Math.max(1, Math.ceil(kFineWidth / map.width));
+  const [columns, rows] = [map.width * split, map.height * split];
+  const basis = new Float64Array(shCount(order));
+  const sums = new Float64Array(3 * basis.length);
+  const rgb = new Float64Array(3);
+  for (let row = 0; row < rows; ++row) {
+    const solidAngle = ((2 * Math.PI) / columns) * (Math.cos((Math.PI * row) / rows) - Math.cos((Math.PI * (row + 1)) / rows));
+    for (let column = 0; column < columns; ++column) {
+      const { x, y, z } = directionAt((column + 0.5) / columns, (row + 0.5) / rows);
+      const texel = map.stride * (Math.floor(row / split) * map.width + Math.floor(column / split));
+      for (let c = 0; c < 3; ++c) rgb[c] = map.data[texel + c];
+      evaluateSh(order, x, y, z, basis);
+      accumulate(sums, basis, rgb, solidAngle);
+    }
+  }
+  return Float32Array.from(sums);
+}
+
+/// SH light as a picture of `width` x `width / 2` texels, rows from the top, RGBA. Negative lobes are shown as black.
+export function lightToEquirect(order: number, light: ArrayLike<number>, width: number): EquirectMap {
+  const height = width / 2;
+  const data = new Float32Array(4 * width * height);
+  const basis = new Float64Array(shCount(order));
+  const rgb = new Float64Array(3);
+  for (let texel = 0; texel < width * height; ++texel) {
+    const { x, y, z } = directionAt(((texel % width) + 0.5) / width, (Math.floor(texel / width) + 0.5) / height);
+    evaluateSh(order, x, y, z, basis);
+    lightAlong(basis, light, rgb);
+    for (let c = 0; c < 3; ++c) data[4 * texel + c] = Math.max(0, rgb[c]);
+    data[4 * texel + 3] = 1;
+  }
+  return { width, height, stride: 4, data };
+}
+
+/// Halves a map until it is at most `width` wide: each 2 x 2 block becomes its mean, weighted by solid angle.
+export function shrinkEquirect(map: EquirectMap, width: number): EquirectMap {
+  let out = map;
+  while (out.width > width && out.width % 2 === 0 && out.height % 2 === 0) out = halve(out);
+  return out;
+}
+
+function halve(map: EquirectMap): EquirectMap {
+  const [width, height] = [map.width / 2, map.height / 2];
+  const data = new Float32Array(map.stride * width * height);
+  const band = (row: number) => Math.cos((Math.PI * row) / map.height) - Math.cos((Math.PI * (row + 1)) / map.height);
+  for (let row = 0; row < height; ++row) {
+    const upper = band(2 * row) / (band(2 * row) + band(2 * row + 1));
+    for (let column = 0; column < width; ++column) {
+      const from = map.stride * (2 * row * map.width + 2 * column);
+      const below = from + map.stride * map.width;
+      const to = map.stride * (row * width + column);
+      for (let c = 0; c < map.stride; ++c) {
+        const top = map.data[from + c] + map.data[from + map.stride + c];
+        const bottom = map.data[below + c] + map.data[below + map.stride + c];
+        data[to + c] = 0.5 * (upper * top + (1 - upper) * bottom);
+      }
+    }
+  }
+  return { width, height, stride: map.stride, data };
+}

@@ -1,0 +1,73 @@
+// The page's side of the light worker. Owns the worker: dispose() ends it.
+
+import type { LoadRequest, ProjectReply, Reply, Request, ValuesReply } from './messages';
+
+type Answer = { resolve(reply: Reply): void; reject(error: Error): void };
+
+export class Relighter {
+  private readonly worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
+  private readonly waiting = new Map<number, Answer>();
+  private serial = 0;
+
+  constructor() {
+    this.worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => this.settle(data));
+    this.worker.addEventListener('error', (event) => this.failAll(new Error(event.message || 'the light worker stopped')));
+  }
+
+  /// Gives the transfer vectors away: the arrays of `request` are empty afterwards.
+  async load(request: Omit<LoadRequest, 'kind'>): Promise<void> {
+    const arrays = request.parts.flatMap((part) => part.attributes);
+    await this.ask({ kind: 'load', ...request }, arrays);
+  }
+
+  /// Light at every vertex of every part. `reuse`: arrays of an earlier reply that are no longer needed.
+  relight(light: Float32Array, lamps: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
+    return this.values({ kind: 'relight', light, lamps, reuse }, reuse);
+  }
+
+  measure(weighted: boolean): Promise<ValuesReply> {
+    return this.values({ kind: 'measure', weighted });
+  }
+
+  coefficient(channel: number, slot: number): Promise<ValuesReply> {
+    return this.values({ kind: 'coefficient', channel, slot });
+  }
+
+  async project(name: string, file: ArrayBuffer, order: number): Promise<ProjectReply> {
+    const reply = await this.ask({ kind: 'project', name, file, order }, []);
+    if (!('projected' in reply)) throw new Error('the light worker answered another question');
+    return reply.projected;
+  }
+
+  dispose(): void {
+    this.worker.terminate();
+    this.failAll(new DOMException('the viewer was closed', 'AbortError'));
+  }
+
+  private async values(request: Request, give: Float32Array[] = []): Promise<ValuesReply> {
+    const reply = await this.ask(request, give);
+    if (!('values' in reply)) throw new Error('the light worker answered another question');
+    return reply.values;
+  }
+
+  private ask(request: Request, give: Float32Array[]): Promise<Reply> {
+    const serial = ++this.serial;
+    const transfer = [...new Set(give.map((array) => array.buffer))];
+    return new Promise((resolve, reject) => {
+      this.waiting.set(serial, { resolve, reject });
+      this.worker.postMessage({ ...request, serial }, { transfer });
+    });
+  }
+
+  private settle(reply: Reply): void {
+    const answer = this.waiting.get(reply.serial);
+    this.waiting.delete(reply.serial);
+    if ('failure' in reply) answer?.reject(new Error(reply.failure));
+    else answer?.resolve(reply);
+  }
+
+  private failAll(error: Error): void {
+    for (const answer of this.waiting.values()) answer.reject(error);
+    this.waiting.clear();
+  }
+}

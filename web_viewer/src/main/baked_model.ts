@@ -1,0 +1,118 @@
+// The baked scene on the GPU: geometry, one material per part, and the `light` attribute that the worker fills.
+
+import {
+  Box3,
+  BufferAttribute,
+  type BufferGeometry,
+  DynamicDrawUsage,
+  type Material,
+  type Mesh,
+  type MeshBasicMaterial,
+  type MeshStandardMaterial,
+  type Object3D,
+  type ShaderMaterial,
+  type Texture,
+} from 'three';
+import { readRadianceTransfer, transferAttributes, type RadianceTransfer, type TransferPart } from '../asset/kiln_reader';
+import type { LoadedAsset } from '../asset/load_gltf';
+import type { PartData } from '../light/messages';
+import { bakedMaterial } from '../shaders/baked_material';
+
+export interface BakedPart {
+  mesh: Mesh<BufferGeometry, Material>;
+  material: ShaderMaterial;
+  light: BufferAttribute;
+}
+
+export class BakedModel {
+  readonly parts: BakedPart[] = [];
+  readonly root: Object3D;
+  readonly bounds: Box3;
+  private readonly ownedMaterials = new Set<Material>();
+
+  private constructor(
+    asset: LoadedAsset,
+    readonly transfer: RadianceTransfer,
+    /// What the light worker wants; it takes the arrays away.
+    readonly workerData: PartData[],
+  ) {
+    this.root = asset.gltf.scene;
+    this.root.updateMatrixWorld(true);
+    this.bounds = new Box3().setFromObject(this.root);
+  }
+
+  static async create(asset: LoadedAsset): Promise<BakedModel> {
+    const transfer = readRadianceTransfer(asset.gltf);
+    if (!transfer || transfer.parts.length === 0) throw new Error('this glTF carries no KILN_radiance_transfer');
+    const data = transfer.parts.map((part) => takeTransfer(transfer, part));
+    const model = new BakedModel(asset, transfer, data);
+    for (const part of transfer.parts) model.parts.push(await model.dress(part, asset));
+    return model;
+  }
+
+  get vertices(): number {
+    return this.parts.reduce((sum, part) => sum + part.light.count, 0);
+  }
+
+  get triangles(): number {
+    return this.parts.reduce((sum, part) => sum + (part.mesh.geometry.index?.count ?? 0) / 3, 0);
+  }
+
+  /// Shows new light and gives back the arrays it replaces.
+  setLight(values: Float32Array[]): Float32Array[] {
+    return this.parts.map(({ light }, i) => {
+      const before = light.array as Float32Array;
+      light.array = values[i];
+      light.needsUpdate = true;
+      return before;
+    });
+  }
+
+  setWhite(white: boolean): void {
+    for (const { material } of this.parts) material.uniforms.white.value = white;
+  }
+
+  private async dress(part: TransferPart, asset: LoadedAsset): Promise<BakedPart> {
+    const geometry = part.geometry;
+    const unlit = part.mesh.material as MeshBasicMaterial;
+    const original = part.material < 0 ? undefined : ((await asset.gltf.parser.getDependency('material', part.material)) as MeshStandardMaterial);
+    this.ownedMaterials.add(unlit);
+    if (original) this.ownedMaterials.add(original);
+    const light = new BufferAttribute(new Float32Array(3 * geometry.getAttribute('position').count), 3);
+    geometry.setAttribute('light', light.setUsage(DynamicDrawUsage));
+    const material = bakedMaterial({ unlit, original, albedo: part.albedo, emission: part.emission, vertexAlbedo: geometry.hasAttribute('_albedo') });
+    part.mesh.material = material;
+    return { mesh: part.mesh as BakedPart['mesh'], material, light };
+  }
+
+  dispose(): void {
+    this.root.removeFromParent();
+    for (const { mesh, material } of this.parts) {
+      mesh.geometry.dispose();
+      material.dispose();
+    }
+    disposeMaterials(this.ownedMaterials);
+  }
+}
+
+/// Moves the coefficients out of the geometry: the GPU never sees them. Positions and indices are copied.
+function takeTransfer(transfer: RadianceTransfer, part: TransferPart): PartData {
+  const { geometry } = part;
+  const attributes = transferAttributes(transfer, geometry);
+  for (const name of transfer.attributes) geometry.deleteAttribute(name.toLowerCase());
+  geometry.deleteAttribute('color');
+  if (!geometry.index) throw new Error('a baked primitive has no indices');
+  return {
+    attributes,
+    positions: Float32Array.from(geometry.getAttribute('position').array),
+    indices: Uint32Array.from(geometry.index.array),
+  };
+}
+
+/// Materials and every texture they hold.
+export function disposeMaterials(materials: Iterable<Material>): void {
+  for (const material of materials) {
+    for (const value of Object.values(material)) if ((value as Texture | null)?.isTexture) (value as Texture).dispose();
+    material.dispose();
+  }
+}

@@ -1,0 +1,63 @@
+// Before and after: left of the divider the original materials under the same light without shadows (three's image-based
+// light, what a viewer shows without a bake), right of it the baked model.
+
+import { type Light, type Mesh, type Object3D, type Material, Scene, type Texture } from 'three';
+import { disposeMaterials } from './baked_model';
+import type { Stage } from './stage';
+import { SkyBackground } from '../shaders/sky_background';
+
+export interface ComparisonLight {
+  reflection: Texture; // equirectangular, for scene.environment
+  background: Texture | null;
+  rotation: number;
+  intensity: number;
+  lamps: boolean;
+}
+
+export class Comparison {
+  divider = 0.5;
+  private readonly scene = new Scene();
+  private readonly background = new SkyBackground();
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly original: Object3D,
+  ) {
+    this.scene.add(original, this.background.mesh);
+    stage.drawWith = (width, height) => this.draw(width, height);
+  }
+
+  setLight({ reflection, background, rotation, intensity, lamps }: ComparisonLight): void {
+    this.scene.environment = reflection;
+    this.scene.environmentRotation.y = (rotation * Math.PI) / 180;
+    this.scene.environmentIntensity = intensity;
+    this.background.show(background, rotation, intensity);
+    this.original.traverse((object) => {
+      if ((object as Light).isLight) object.visible = lamps;
+    });
+  }
+
+  private draw(width: number, height: number): void {
+    const { renderer, scene, camera } = this.stage;
+    const split = Math.round(this.divider * width);
+    renderer.setScissorTest(true);
+    renderer.setScissor(0, 0, split, height);
+    renderer.render(this.scene, camera);
+    renderer.setScissor(split, 0, width - split, height);
+    renderer.render(scene, camera);
+    renderer.setScissorTest(false);
+  }
+
+  dispose(): void {
+    this.stage.drawWith = null;
+    this.scene.environment = null;
+    this.background.dispose();
+    const materials = new Set<Material>();
+    this.original.traverse((object) => {
+      const { geometry, material } = object as Mesh;
+      geometry?.dispose();
+      for (const one of [material].flat()) if (one) materials.add(one);
+    });
+    disposeMaterials(materials);
+  }
+}

@@ -1,0 +1,58 @@
+// The lights a viewer can choose from, as SH coefficients of one order, before rotation and intensity.
+
+import { lightToEquirect, type EquirectMap } from '../light/equirect';
+import { kSkies, projectSky } from '../light/skies';
+import { rotateAboutY, withOrder } from '../light/sh';
+
+export interface LightChoice {
+  id: string;
+  label: string;
+}
+
+const kShownWidth = 128; // SH of order 10 resolve 20 degrees; 128 texels are 2.8 degrees apart
+
+export class Lights {
+  private readonly known = new Map<string, Float32Array>();
+  private map: EquirectMap | null = null;
+  readonly choices: LightChoice[] = [];
+
+  /// `baked` is empty when the bake had no distant light.
+  constructor(
+    readonly order: number,
+    baked: Float32Array,
+    bakedName: string,
+  ) {
+    this.known.set('baked', withOrder(baked, order));
+    this.choices.push({ id: 'baked', label: baked.length > 0 ? `As baked: ${bakedName || 'environment'}` : 'As baked: no sky, lamps only' });
+    this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
+  }
+
+  addFile(name: string, light: Float32Array, map: EquirectMap): void {
+    this.known.set('file', light);
+    this.map = map;
+    const place = this.choices.findIndex(({ id }) => id === 'file');
+    this.choices.splice(place < 0 ? this.choices.length : place, place < 0 ? 0 : 1, { id: 'file', label: `Dropped: ${name}` });
+  }
+
+  coefficients(id: string): Float32Array {
+    let light = this.known.get(id);
+    if (!light) {
+      const sky = kSkies.find((one) => one.id === id);
+      light = sky ? projectSky(sky, this.order) : new Float32Array(3 * this.order ** 2);
+      this.known.set(id, light);
+    }
+    return light;
+  }
+
+  /// As the model receives it.
+  turned(id: string, rotation: number, intensity: number): Float32Array {
+    const light = rotateAboutY(this.order, this.coefficients(id), rotation);
+    for (let i = 0; i < light.length; ++i) light[i] *= intensity;
+    return light;
+  }
+
+  /// A picture of it: of the coefficients, or of the dropped map itself.
+  picture(id: string, ofMap: boolean): EquirectMap {
+    return ofMap && id === 'file' && this.map ? this.map : lightToEquirect(this.order, this.coefficients(id), kShownWidth);
+  }
+}

@@ -1,0 +1,143 @@
+// The renderer, the camera and its controls. Draws only when asked to; between two requests nothing runs.
+
+import {
+  ACESFilmicToneMapping,
+  Box3,
+  LinearToneMapping,
+  MOUSE,
+  NeutralToneMapping,
+  PerspectiveCamera,
+  Scene,
+  Sphere,
+  type ToneMapping,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import type { ToneMap } from './view_state';
+
+const kToneMappings: Record<ToneMap, ToneMapping> = {
+  neutral: NeutralToneMapping,
+  aces: ACESFilmicToneMapping,
+  none: LinearToneMapping, // exposure and clamping only
+};
+
+/// Camera place and target in units of the model's radius about its centre: it fits any scale, and short numbers do.
+export type CameraPose = readonly [number, number, number, number, number, number];
+
+export const kDefaultPose: CameraPose = [1.35, 0.95, 1.9, 0, 0, 0];
+
+export class Stage {
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(38, 1, 0.01, 100);
+  readonly renderer: WebGLRenderer;
+  readonly controls: OrbitControls;
+  /// Called in place of the plain draw when set (the comparison draws two halves).
+  drawWith: ((width: number, height: number) => void) | null = null;
+  onDrawn: (() => void) | null = null;
+  onMoved: (() => void) | null = null;
+  private readonly bounds = new Sphere(new Vector3(), 1);
+  private readonly resizes: ResizeObserver;
+  private frame = 0;
+
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+    this.renderer.info.autoReset = true;
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.mouseButtons = { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
+    this.controls.addEventListener('change', () => {
+      this.requestDraw();
+      this.onMoved?.();
+    });
+    this.resizes = new ResizeObserver(() => this.resize());
+    this.resizes.observe(canvas);
+    canvas.addEventListener('webglcontextrestored', this.requestDraw);
+    this.resize();
+  }
+
+  requestDraw = (): void => {
+    if (this.frame === 0) this.frame = requestAnimationFrame(() => this.drawNow());
+  };
+
+  drawNow(): void {
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    const { clientWidth, clientHeight } = this.canvas;
+    if (this.drawWith) this.drawWith(clientWidth, clientHeight);
+    else this.renderer.render(this.scene, this.camera);
+    this.onDrawn?.();
+  }
+
+  setLook(exposure: number, toneMap: ToneMap): void {
+    this.renderer.toneMapping = kToneMappings[toneMap];
+    this.renderer.toneMappingExposure = exposure;
+    this.requestDraw();
+  }
+
+  /// The model's place and size: framing, near and far planes follow from it.
+  setBounds(box: Box3): void {
+    if (!box.isEmpty()) box.getBoundingSphere(this.bounds);
+    if (!(this.bounds.radius > 0)) this.bounds.radius = 1;
+    this.controls.minDistance = 0.02 * this.bounds.radius;
+    this.controls.maxDistance = 30 * this.bounds.radius;
+  }
+
+  get pose(): CameraPose {
+    const { center, radius } = this.bounds;
+    const place = this.camera.position.clone().sub(center).divideScalar(radius);
+    const target = this.controls.target.clone().sub(center).divideScalar(radius);
+    return [place.x, place.y, place.z, target.x, target.y, target.z];
+  }
+
+  set pose(pose: CameraPose) {
+    const { center, radius } = this.bounds;
+    this.camera.position.set(pose[0], pose[1], pose[2]).multiplyScalar(radius).add(center);
+    this.controls.target.set(pose[3], pose[4], pose[5]).multiplyScalar(radius).add(center);
+    this.fitPlanes();
+    this.controls.update();
+    this.requestDraw();
+  }
+
+  /// Moves back along the present direction until the whole model is seen.
+  frameModel(): void {
+    const { center, radius } = this.bounds;
+    const direction = this.camera.position.clone().sub(this.controls.target).normalize();
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(direction, this.framingDistance() * radius);
+    this.fitPlanes();
+    this.controls.update();
+    this.requestDraw();
+  }
+
+  private framingDistance(): number {
+    const vertical = (this.camera.fov * Math.PI) / 360;
+    const narrow = Math.min(vertical, Math.atan(Math.tan(vertical) * this.camera.aspect));
+    return 1.02 / Math.sin(narrow);
+  }
+
+  private fitPlanes(): void {
+    const { radius } = this.bounds;
+    this.camera.near = 0.005 * radius;
+    this.camera.far = 64 * radius;
+    this.camera.updateProjectionMatrix();
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.drawNow(); // a resized canvas is blank: do not wait for the next frame
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.frame);
+    this.frame = -1; // no request starts a frame any more
+    this.resizes.disconnect();
+    this.canvas.removeEventListener('webglcontextrestored', this.requestDraw);
+    this.controls.dispose();
+    this.renderer.dispose();
+  }
+}

@@ -1,0 +1,81 @@
+// Everything a viewer page shows, as plain data, and the same as the part of its address after '#'.
+// Defaults are left out, so that a fresh page has a clean address.
+
+import type { CameraPose } from './stage';
+
+export type ToneMap = 'neutral' | 'aces' | 'none';
+export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient';
+export type Background = 'off' | 'light' | 'map';
+
+export interface ViewState {
+  light: string; // 'baked', the id of a sky, or 'file' for a dropped map
+  rotation: number; // degrees about +Y
+  intensity: number;
+  lamps: boolean;
+  ev: number;
+  tone: ToneMap;
+  background: Background;
+  wire: boolean;
+  mode: Mode;
+  channel: number;
+  slot: number;
+  compare: number | null; // where the divider stands, 0 to 1; null: off
+  pose: CameraPose | null; // null: the default view
+}
+
+export const kDefaultState: ViewState = {
+  light: 'baked',
+  rotation: 0,
+  intensity: 1,
+  lamps: true,
+  ev: 0,
+  tone: 'neutral',
+  background: 'light',
+  wire: false,
+  mode: 'shaded',
+  channel: 0,
+  slot: 0,
+  compare: null,
+  pose: null,
+};
+
+const short = (value: number): string => String(Number(value.toFixed(3)));
+
+export function encodeState(state: ViewState): string {
+  const out = new URLSearchParams();
+  for (const key of Object.keys(kDefaultState) as (keyof ViewState)[]) {
+    const value = state[key];
+    if (value === kDefaultState[key] || value === null) continue;
+    if (key === 'light' && value === 'file') continue; // a dropped file cannot travel in an address
+    out.set(key, Array.isArray(value) ? value.map(short).join(',') : typeof value === 'number' ? short(value) : String(value));
+  }
+  return out.toString().replaceAll('%2C', ',');
+}
+
+/// Reads what encodeState wrote. Whatever it does not understand keeps its default: an address is anyone's text.
+export function decodeState(text: string, lights: readonly string[]): ViewState {
+  const from = new URLSearchParams(text);
+  const number = (key: keyof ViewState, low: number, high: number): number => {
+    const value = Number(from.get(key) ?? NaN);
+    return Number.isFinite(value) ? Math.min(high, Math.max(low, value)) : (kDefaultState[key] as number);
+  };
+  const one = <T extends string>(key: keyof ViewState, allowed: readonly T[]): T =>
+    allowed.includes(from.get(key) as T) ? (from.get(key) as T) : (kDefaultState[key] as T);
+  const flag = (key: keyof ViewState): boolean => (from.has(key) ? from.get(key) === 'true' : (kDefaultState[key] as boolean));
+  const pose = (from.get('pose') ?? '').split(',').map(Number);
+  return {
+    light: one('light', lights),
+    rotation: number('rotation', -180, 180),
+    intensity: number('intensity', 0, 100),
+    lamps: flag('lamps'),
+    ev: number('ev', -8, 8),
+    tone: one<ToneMap>('tone', ['neutral', 'aces', 'none']),
+    background: one<Background>('background', ['off', 'light', 'map']),
+    wire: flag('wire'),
+    mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient']),
+    channel: Math.round(number('channel', 0, 2)),
+    slot: Math.round(number('slot', 0, 100)),
+    compare: from.has('compare') ? number('compare', 0, 1) : null,
+    pose: pose.length === 6 && pose.every(Number.isFinite) ? (pose as unknown as CameraPose) : null,
+  };
+}

@@ -1,0 +1,217 @@
+// The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
+
+import type { LoadedAsset } from '../asset/load_gltf';
+import { Relighter } from '../light/relighter';
+import { SkyBackground } from '../shaders/sky_background';
+import { skyTexture } from '../shaders/sky_texture';
+import type { Texture } from 'three';
+import { BakedModel } from './baked_model';
+import { Comparison } from './comparison';
+import { HeatMap, type HeatMapData } from './heat_map';
+import { Lights } from './lights';
+import { kDefaultPose, type Stage } from './stage';
+import { Store } from './store';
+import type { ViewState } from './view_state';
+import { Wireframe } from './wireframe';
+
+/// What the legend shows.
+export type Legend = Pick<HeatMapData, 'map' | 'range'> | null;
+
+export class Viewer {
+  readonly lights: Lights;
+  onLegend: (legend: Legend) => void = () => {};
+  onFailure: (message: string) => void = () => {};
+  /// Called when the list of lights has grown.
+  onLights: () => void = () => {};
+  private readonly relighter = new Relighter();
+  private readonly background = new SkyBackground();
+  private readonly unsubscribe: () => void;
+  /// What the worker needed for the light that is shown.
+  relitMilliseconds = 0;
+  private wireframe: Wireframe | null = null;
+  private heatMap: HeatMap | null = null;
+  private comparison: Comparison | null = null;
+  private comparisonAsked = false;
+  private pictures: { key: string; background: Texture; reflection: Texture | null } | null = null;
+  private spare: Float32Array[] = [];
+  private relighting = false;
+  private relightAgain = false;
+  private heatSerial = 0;
+  private disposed = false;
+
+  private constructor(
+    readonly stage: Stage,
+    readonly asset: LoadedAsset,
+    readonly model: BakedModel,
+    readonly state: Store<ViewState>,
+  ) {
+    const { transfer } = model;
+    this.lights = new Lights(transfer.order, transfer.bakedLight, transfer.light?.name ?? '');
+    stage.scene.add(model.root, this.background.mesh);
+    stage.setBounds(model.bounds);
+    this.setPose();
+    this.unsubscribe = state.subscribe((_state, changed) => this.apply(changed));
+  }
+
+  /// Resolves when the first light is on the screen.
+  static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>): Promise<Viewer> {
+    const model = await BakedModel.create(asset);
+    const viewer = new Viewer(stage, asset, model, state);
+    const { order, channels, fixed, slots, scale, offset } = model.transfer;
+    await viewer.relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
+    await viewer.relightOnce();
+    viewer.apply(new Set<keyof ViewState>(['ev', 'tone', 'background', 'wire', 'mode', 'compare']));
+    stage.drawNow();
+    return viewer;
+  }
+
+  private setPose(): void {
+    const { pose } = this.state.get();
+    this.stage.pose = pose ?? kDefaultPose;
+    if (!pose) this.stage.frameModel();
+  }
+
+  private apply(changed: ReadonlySet<keyof ViewState>): void {
+    const has = (...keys: (keyof ViewState)[]) => keys.some((key) => changed.has(key));
+    const state = this.state.get();
+    if (has('light', 'rotation', 'intensity', 'lamps')) void this.relight();
+    if (has('ev', 'tone')) this.stage.setLook((this.model.transfer.look?.exposure ?? 1) * 2 ** state.ev, state.tone);
+    if (has('mode', 'channel', 'slot')) void this.showMode(state);
+    if (has('wire')) this.showWire(state.wire);
+    if (has('compare')) void this.compare(state.compare);
+    if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare')) this.showSky();
+    this.stage.requestDraw();
+  }
+
+  /// At most one request is under way; while it is, only the newest light waits.
+  private async relight(): Promise<void> {
+    this.relightAgain = this.relighting;
+    if (this.relighting) return;
+    this.relighting = true;
+    try {
+      await this.relightOnce();
+    } catch (error) {
+      this.fail(error);
+    }
+    this.relighting = false;
+    if (this.relightAgain) await this.relight();
+  }
+
+  private async relightOnce(): Promise<void> {
+    const { light, rotation, intensity, lamps } = this.state.get();
+    const reply = await this.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, this.spare);
+    this.spare = this.model.setLight(reply.values);
+    this.relitMilliseconds = reply.milliseconds;
+    this.stage.requestDraw();
+  }
+
+  private async showMode({ mode, channel, slot }: Readonly<ViewState>): Promise<void> {
+    const serial = ++this.heatSerial;
+    const plain = mode === 'shaded' || mode === 'light';
+    try {
+      const data = plain ? null : await this.heatData(mode, channel, slot);
+      if (serial !== this.heatSerial || this.disposed) return;
+      this.heatMap?.dispose();
+      this.heatMap = data && new HeatMap(this.model, data);
+      this.model.setWhite(mode === 'light');
+      this.onLegend(data);
+      this.stage.requestDraw();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  private async heatData(mode: ViewState['mode'], channel: number, slot: number): Promise<HeatMapData> {
+    if (mode === 'coefficient') {
+      const { values, range } = await this.relighter.coefficient(channel, Math.min(slot, this.model.transfer.slots - 1));
+      return { per: 'vertex', values, map: 'diverging', range: [-range, range] };
+    }
+    const { values, range } = await this.relighter.measure(mode === 'weighted');
+    return { per: 'triangle', values, map: 'viridis', range: [0, range] };
+  }
+
+  private showWire(wire: boolean): void {
+    this.wireframe?.dispose();
+    this.wireframe = wire ? new Wireframe(this.model) : null;
+  }
+
+  private async compare(divider: number | null): Promise<void> {
+    this.comparisonAsked = divider !== null;
+    if (divider === null) {
+      this.comparison?.dispose();
+      this.comparison = null;
+    } else if (this.comparison) {
+      this.comparison.divider = divider;
+    } else if (this.asset.hasOriginal) {
+      await this.loadComparison();
+    } else {
+      this.onFailure('This file has no second scene with the original materials.');
+    }
+  }
+
+  private async loadComparison(): Promise<void> {
+    try {
+      const original = await this.asset.loadOriginal();
+      if (!this.comparisonAsked || this.disposed || this.comparison) return;
+      this.comparison = new Comparison(this.stage, original);
+      this.comparison.divider = this.state.get().compare ?? 0.5;
+      this.showSky();
+      this.stage.requestDraw();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  private showSky(): void {
+    const { light, background, rotation, intensity, lamps } = this.state.get();
+    const pictures = background === 'off' && !this.comparison ? null : this.picturesOf(light, background === 'map');
+    const shown = background === 'off' ? null : (pictures?.background ?? null);
+    this.background.show(shown, rotation, intensity);
+    if (this.comparison && pictures) {
+      pictures.reflection ??= skyTexture(this.lights.picture(light, true), true);
+      this.comparison.setLight({ reflection: pictures.reflection, background: shown, rotation, intensity, lamps });
+    }
+  }
+
+  private picturesOf(light: string, ofMap: boolean): { background: Texture; reflection: Texture | null } {
+    const key = `${light} ${ofMap}`;
+    if (this.pictures?.key !== key) {
+      this.dropPictures();
+      this.pictures = { key, background: skyTexture(this.lights.picture(light, ofMap), false), reflection: null };
+    }
+    return this.pictures!;
+  }
+
+  private dropPictures(): void {
+    this.pictures?.background.dispose();
+    this.pictures?.reflection?.dispose();
+    this.pictures = null;
+  }
+
+  /// Reads a .hdr or .exr and makes it the light.
+  async useFile(file: File): Promise<void> {
+    const { light, map } = await this.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
+    this.lights.addFile(file.name, light, map);
+    this.dropPictures();
+    this.onLights();
+    if (this.state.get().light === 'file') this.apply(new Set<keyof ViewState>(['light']));
+    else this.state.set({ light: 'file' });
+  }
+
+  private fail(error: unknown): void {
+    if (!this.disposed) this.onFailure(error instanceof Error ? error.message : String(error));
+  }
+
+  dispose(): void {
+    this.disposed = true;
+    this.unsubscribe();
+    this.relighter.dispose();
+    this.comparison?.dispose();
+    this.heatMap?.dispose();
+    this.wireframe?.dispose();
+    this.background.dispose();
+    this.dropPictures();
+    this.model.dispose();
+    this.asset.dispose();
+  }
+}

@@ -1,0 +1,44 @@
+// The triangles' edges over the shaded model. Each edge once; the positions are the model's own.
+
+import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments } from 'three';
+import type { BakedModel } from './baked_model';
+
+export class Wireframe {
+  private readonly material = new LineBasicMaterial({ color: 0x0a0a0a, transparent: true, opacity: 0.55, toneMapped: false });
+  private readonly lines: LineSegments[];
+
+  constructor(model: BakedModel) {
+    this.lines = model.parts.map(({ mesh }) => {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', mesh.geometry.getAttribute('position'));
+      geometry.setIndex(new BufferAttribute(edgesOf(mesh.geometry.index!.array), 1));
+      const lines = new LineSegments(geometry, this.material);
+      mesh.add(lines);
+      return lines;
+    });
+  }
+
+  dispose(): void {
+    for (const lines of this.lines) {
+      lines.removeFromParent();
+      lines.geometry.deleteAttribute('position'); // the model's: it must outlive this geometry
+      lines.geometry.dispose();
+    }
+    this.material.dispose();
+  }
+}
+
+/// Pairs of vertex indices, each undirected edge once.
+export function edgesOf(indices: ArrayLike<number>): Uint32Array {
+  const seen = new Set<number>();
+  const out: number[] = [];
+  for (let i = 0; i < indices.length; ++i) {
+    const [a, b] = [indices[i], indices[i % 3 === 2 ? i - 2 : i + 1]];
+    const [low, high] = a < b ? [a, b] : [b, a];
+    const key = high * 0x4000000 + low; // both below 2^26
+    if (seen.has(key)) continue;
+    seen.add(key);
+    out.push(low, high);
+  }
+  return Uint32Array.from(out);
+}

@@ -1,0 +1,66 @@
+// What is known about the result: counts, certificate, plan, warnings.
+
+import type { Report } from '../asset/jobs';
+import type { Viewer } from '../main/viewer';
+import { h } from './dom';
+import { bytes, count, percent, plain, seconds } from './format';
+
+type Row = readonly [string, string];
+
+export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
+  const box = h('div', { class: 'statistics' }, pairs(sizes(viewer)));
+  if (!report) return box;
+  if (report.certificate?.relrmse !== undefined) box.append(h('h3', {}, 'Certificate'), certificate(report.certificate));
+  if (report.warnings?.length) box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
+  if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
+  if (report.stages?.length) box.append(h('h3', {}, 'Time'), pairs(stages(report)));
+  if (report.result?.streams?.length) box.append(h('h3', {}, 'Bytes'), pairs(report.result.streams.map((s): Row => [s.name, bytes(s.bytes)])));
+  return box;
+}
+
+function sizes({ model, asset }: Viewer): Row[] {
+  const { order, channels, fixed, slots, units } = model.transfer;
+  const per = asset.bytes / Math.max(1, model.vertices);
+  return [
+    ['Vertices', count(model.vertices)],
+    ['Triangles', count(model.triangles)],
+    ['File', `${bytes(asset.bytes)}, ${per.toFixed(1)} B per vertex`],
+    ['Harmonics', `order ${order}, ${order * order} × ${channels === 3 ? 'RGB' : 'grey'}`],
+    ['Numbers per vertex', `${channels * slots}${fixed ? ', lamps among them' : ''}`],
+    ['Units', units ?? '–'],
+  ];
+}
+
+function certificate(c: NonNullable<Report['certificate']>): HTMLElement {
+  const interval = c.interval ? ` (95 %: ${percent(c.interval[0])} to ${percent(c.interval[1])})` : '';
+  const rows: Row[] = [
+    ['Without worst 1 %', percent(c.relrmse_without_worst_1pct)],
+    ['99th percentile', percent(c.p99)],
+    ['Bias', c.bias === undefined ? '–' : `${(100 * c.bias).toFixed(2)} %`],
+    ['Measured at', `${count(c.points)} points, ${count(c.samples)} paths each`],
+    ...(c.lightings ?? []).map((l): Row => [`under ${l.name}`, percent(l.relrmse)]),
+  ];
+  return h('div', {}, h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval}`), pairs(rows));
+}
+
+function warnings(list: NonNullable<Report['warnings']>): HTMLElement {
+  const item = (w: (typeof list)[number]) => h('li', {}, h('code', {}, w.code), ` ${w.message}`, w.where ? h('span', { class: 'hint' }, ` ${w.where}`) : null);
+  return h('ul', { class: 'warnings' }, ...list.map(item));
+}
+
+function plan(list: NonNullable<Report['plan']>): HTMLElement {
+  const item = (d: (typeof list)[number]) =>
+    h('li', {}, h('strong', {}, `${d.decision}: ${plain(d.value)}`), ` ${d.reason}`, d.saves ? h('span', { class: 'hint' }, ` Saves ${plain(d.saves)}.`) : null);
+  return h('ul', { class: 'plan' }, ...list.map(item));
+}
+
+function stages(report: Report): Row[] {
+  const rows = (report.stages ?? []).map((s): Row => [s.name, s.rays ? `${seconds(s.seconds)}, ${count(s.rays)} rays` : seconds(s.seconds)]);
+  if (report.seconds !== undefined) rows.push(['all', seconds(report.seconds)]);
+  if (report.peak_memory_bytes) rows.push(['peak memory', bytes(report.peak_memory_bytes)]);
+  return rows;
+}
+
+function pairs(rows: readonly Row[]): HTMLElement {
+  return h('dl', { class: 'pairs' }, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
