@@ -27,15 +27,15 @@ struct ReferencePoint {
 
 /// Distant light for the estimator: full-detail environments, or environments projected to SH (may be negative).
 struct ReferenceLight {
-  std::vector<Environment> environments;         // each is one lighting
-  int sh_order = 0;                              // > 0: `sh` holds further lightings, one per entry
-  std::vector<std::vector<Vec3f>> sh;            // [lighting][sh_count(sh_order)]
-  bool scene_lights = false;                     // one more lighting, last: emitters and punctual lights of the scene
+  std::vector<Environment> environments;  // each is one lighting
+  int sh_order = 0;                       // > 0: `sh` holds further lightings, one per entry
+  std::vector<std::vector<Vec3f>> sh;     // [lighting][sh_count(sh_order)]
+  bool scene_lights = false;              // one more lighting, last: emitters and punctual lights of the scene
 };
 
 struct ReferenceOptions {
-  int samples = 1024;      // per point
-  int bounces = -1;        // -1: until Russian roulette ends the path (unbiased); 0: direct only
+  int samples = 1024;  // per point
+  int bounces = -1;    // -1: until Russian roulette ends the path (unbiased); 0: direct only
   std::uint64_t seed = 0;
 };
 

@@ -18,14 +18,17 @@ struct SurfacePoint {
 SurfacePoint surface_point(const Scene&, std::uint32_t triangle, float u, float v);
 
 /// Linear reflectance at a point: base colour factor x texture x vertex colour, clamped to [0, 0.999].
-/// Kiln models every surface as Lambertian with this albedo (metals too: their reflectance is kept, its direction is not).
+/// Kiln models every surface as Lambertian with this albedo (metals too: their reflectance is kept, its direction is
+/// not).
 Vec3f albedo_at(const Scene&, const SurfacePoint&);
-/// Emitted radiance, front faces (both for double-sided materials).
+/// Emitted radiance of the front face. The back of a double-sided material emits the same, that of others nothing:
+/// the caller knows from which side it looks.
 Vec3f emission_at(const Scene&, const SurfacePoint&);
 /// Coverage: 1 unless the material's alpha mode is mask (0 or 1) or blend.
 float opacity_at(const Scene&, const SurfacePoint&);
 
-/// Bilinear (or nearest) texel fetch with wrapping, as stored: sRGB decoded when `srgb`. White when the pixels are absent.
+/// Bilinear (or nearest) texel fetch with wrapping, as stored: sRGB decoded when `srgb`. White when the pixels are
+/// absent.
 Vec4f sample_texture(const Scene&, const TextureRef&, const Vec2f& uv, bool srgb);
 
 }  // namespace kiln
