@@ -7,6 +7,7 @@
 // Repeat  same bits for any thread count.      Fails  never on a valid Scene; Cancelled if stopped
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,19 @@ struct DirectTransfer {
 struct TransferStats {
   std::uint64_t rays = 0;
   std::uint64_t open_points = 0;  // points that took the closed form without a ray
+};
+
+/// For many calls on one scene: keeps the direction sets and the test for open points.
+class DirectTransferBaker {
+ public:
+  /// Keeps a reference to the tracer, which must outlive it.
+  DirectTransferBaker(const Tracer&, const DirectTransfer&);
+  ~DirectTransferBaker();
+  std::vector<float> bake(std::span<const TransferPoint>, Threads&, TransferStats* stats = nullptr) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 std::vector<float> bake_direct_transfer(const Tracer&, std::span<const TransferPoint>, const DirectTransfer&, Threads&,

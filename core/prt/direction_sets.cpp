@@ -1,0 +1,59 @@
+#include "core/prt/direction_sets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/random.h"
+#include "core/prt/morton.h"
+#include "core/sphere/sampling.h"
+#include "core/sphere/sh.h"
+
+namespace kiln {
+namespace {
+
+std::vector<Vec2f> sorted_square_points(int samples, std::uint64_t seed) {
+  std::vector<Vec2f> points;
+  for (int i = 0; i < samples; ++i) points.push_back(sobol_owen(static_cast<std::uint32_t>(i), seed));
+  std::sort(points.begin(), points.end(), [](const Vec2f& a, const Vec2f& b) {
+    const std::uint32_t ka = morton_code(a), kb = morton_code(b);
+    return ka != kb ? ka < kb : a.x < b.x;
+  });
+  return points;
+}
+
+}  // namespace
+
+DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed)
+    : samples_((samples + kPacket - 1) / kPacket * kPacket), sets_(sets), row_width_((sh_count(order) + 7) / 8 * 8) {
+  const std::size_t total = index(sets, 0);
+  rows_.assign(total * static_cast<std::size_t>(row_width_), 0.0F);
+  x_.reserve(total), y_.reserve(total), z_.reserve(total);
+  for (int set = 0; set < sets; ++set) {
+    for (const Vec2f& u : sorted_square_points(samples_, mix64(seed ^ static_cast<std::uint64_t>(set)))) {
+      const Vec3f w = cosine_hemisphere(u);
+      if (order > 0) evaluate_sh(order, w, rows_.data() + x_.size() * static_cast<std::size_t>(row_width_));
+      x_.push_back(w.x), y_.push_back(w.y), z_.push_back(w.z);
+    }
+  }
+}
+
+void DirectionSets::turn(int set, int packet, const Basis<float>& basis, Rays16& out) const {
+  const std::size_t first = index(set, packet * kPacket);
+  const float *x = x_.data() + first, *y = y_.data() + first, *z = z_.data() + first;
+  const auto [bx, by, bz] = basis;
+  for (std::size_t i = 0; i < kPacket; ++i) out.dx[i] = bx.x * x[i] + by.x * y[i] + bz.x * z[i];
+  for (std::size_t i = 0; i < kPacket; ++i) out.dy[i] = bx.y * x[i] + by.y * y[i] + bz.y * z[i];
+  for (std::size_t i = 0; i < kPacket; ++i) out.dz[i] = bx.z * x[i] + by.z * y[i] + bz.z * z[i];
+}
+
+LocalFrame local_frame(const DirectionSets& sets, const Vec3f& normal, std::uint64_t seed, std::uint64_t item) {
+  Random random(seed, item);
+  const int set = static_cast<int>(random.next() % static_cast<std::uint64_t>(sets.sets()));
+  const float azimuth = 2 * std::numbers::pi_v<float> * random.uniform();
+  const Basis<float> plain = basis_around(normal);
+  const float c = std::cos(azimuth), s = std::sin(azimuth);
+  return {set, {plain.x * c + plain.y * s, plain.y * c - plain.x * s, plain.z}};
+}
+
+}  // namespace kiln

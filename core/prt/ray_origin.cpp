@@ -1,0 +1,48 @@
+#include "core/prt/ray_origin.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/base/random.h"
+#include "core/prt/morton.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+namespace {
+
+constexpr float kPull = 1e-6F;      // of the unit cube: about half the lift of offset_origin
+constexpr float kSteepest = 0.25F;  // below this cosine between shading and face normal the face lends its own
+
+// The direction of the lift: the shading normal, bent away from a face that it nearly grazes.
+Vec3f lift_direction(const TransferPoint& p) {
+  const float cosine = dot(p.normal, p.face_normal);
+  if (std::abs(cosine) >= kSteepest) return p.normal;
+  return normalized(p.normal + p.face_normal * std::copysign(1.0F, cosine), p.normal);
+}
+
+}  // namespace
+
+Vec3f ray_origin(const TransferPoint& p) {
+  const Vec3f inward = p.inward - p.position;
+  const float distance = length(inward);
+  const Vec3f pulled = distance > 0 ? p.position + inward * (std::min(kPull, 0.5F * distance) / distance) : p.position;
+  return offset_origin(pulled, lift_direction(p));
+}
+
+std::uint64_t point_key(const TransferPoint& p) {
+  std::uint64_t key = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    key = mix64(key ^ (std::uint64_t{std::bit_cast<std::uint32_t>(p.position[i] + 0.0F)} << 32 |
+                       std::bit_cast<std::uint32_t>(p.normal[i] + 0.0F)));
+  }
+  return key;
+}
+
+std::vector<std::uint32_t> morton_order_of(std::span<const TransferPoint> points) {
+  std::vector<Vec3f> positions(points.size());
+  std::transform(points.begin(), points.end(), positions.begin(), [](const TransferPoint& p) { return p.position; });
+  return morton_order(positions);
+}
+
+}  // namespace kiln
