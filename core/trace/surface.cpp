@@ -48,7 +48,7 @@ Vec4f texture_at(const Scene& scene, const SurfacePoint& p, const TextureRef& re
 SurfacePoint surface_point(const Scene& scene, std::uint32_t triangle, float u, float v) {
   const Triangle& t = scene.mesh.triangles[triangle];
   const auto [a, b, c] = corners(scene.mesh.position, t);
-  const Vec3d smooth = normalized(blend(scene.mesh.normal, t, u, v), to_double(scene.mesh.normal[t[0]]));
+  const Vec3d smooth = normalized(blend(scene.mesh.normal, t, u, v), normalized(to_double(scene.mesh.normal[t[0]])));
   // Double edges: needles whose area underflows in float keep their direction; a face without one takes the vertex's.
   const Vec3d face = normalized(cross(to_double(b) - to_double(a), to_double(c) - to_double(a)), smooth);
   // A shading normal under the face is mirrored over it, which is continuous where the two are at right angles.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -55,18 +56,27 @@ void check_device(RTCDevice device) {
   throw std::runtime_error("Embree reports error " + std::to_string(static_cast<int>(error)));
 }
 
-/// All ones in lane i when any of its numbers is not finite (the far end may be infinite).
 using Lanes = std::array<std::uint32_t, kPacket>;
 
-void mark_non_finite(const std::array<float, kPacket>& values, Lanes& bad) {
-  for (std::size_t i = 0; i < kPacket; ++i)
-    bad[i] |= (std::bit_cast<std::uint32_t>(values[i]) & 0x7f800000U) + 0x00800000U;  // exponent 255 sets the top bit
+/// Sets the top bit of lane i when values[i] is not finite or from 2^60 on: Embree asserts below 1.84e18.
+void mark_out_of_range(const std::array<float, kPacket>& values, Lanes& bad) {
+  constexpr std::uint32_t kExponent = 0x7f800000U, kRest = (256U - (127U + 60U)) << 23;
+  for (std::size_t i = 0; i < kPacket; ++i) bad[i] |= (std::bit_cast<std::uint32_t>(values[i]) & kExponent) + kRest;
+}
+
+/// Embree's asserts also look at lanes that are switched off.
+void clear_lanes_from(int count, RTCRay16& ray) {
+  for (int i = count; i < kPacket; ++i) {
+    ray.org_x[i] = ray.org_y[i] = ray.org_z[i] = ray.dir_x[i] = ray.dir_y[i] = ray.tfar[i] = 0;
+    ray.dir_z[i] = 1;
+  }
 }
 
 void load(const Rays16& rays, int count, RTCRay16& ray, int* valid) {
   EXPECTS(count >= 0 && count <= kPacket);
   Lanes bad{};
-  for (const auto* values : {&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz}) mark_non_finite(*values, bad);
+  for (const auto* values : {&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz})
+    mark_out_of_range(*values, bad);
   std::uint32_t any = 0;
   for (int i = 0; i < kPacket; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -87,10 +97,14 @@ void load(const Rays16& rays, int count, RTCRay16& ray, int* valid) {
   std::memcpy(ray.dir_y, rays.dy.data(), sizeof ray.dir_y);
   std::memcpy(ray.dir_z, rays.dz.data(), sizeof ray.dir_z);
   std::memcpy(ray.tfar, rays.far.data(), sizeof ray.tfar);
+  clear_lanes_from(count, ray);
 }
 
 RTCRay single_ray(const Vec3f& origin, const Vec3f& direction, float far) {
-  EXPECTS(is_finite(origin) && is_finite(direction) && far >= 0);
+  const auto in_range = [](const Vec3f& a) {
+    return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)}) < 0x1p60F;
+  };
+  EXPECTS(is_finite(origin) && is_finite(direction) && in_range(origin) && in_range(direction) && far >= 0);
   RTCRay ray{};
   ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
   ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
