@@ -1,0 +1,47 @@
+#pragma once
+// One exchange: a head becomes a request, its rules are checked, its handler runs, the reply is written and logged.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/access_log.h"
+#include "server/http/connection.h"
+#include "server/http/gate.h"
+#include "server/http/metrics.h"
+#include "server/http/router.h"
+
+namespace kiln {
+
+struct ExchangeRules {
+  std::uint64_t max_upload_bytes = 8ull << 30;
+  std::vector<std::string> hosts;  // names a Host field may have; empty: any
+};
+
+class Exchange {
+ public:
+  /// `fallback` answers GET of paths that no endpoint has (the viewer's files); it may leave them unanswered.
+  Exchange(ExchangeRules rules, Router router, std::function<std::optional<Reply>(Request&)> fallback, Gate& uploads,
+           HttpMetrics& metrics, LogLine log);
+
+  /// Serves one request. True when its bytes were read to the end.
+  bool serve(Connection&, std::string_view head, const std::string& peer);
+
+ private:
+  Reply answer(const Head&, Request&, const RouteMatch&, AccessEntry&);
+  Reply dispatch(Request&, const RouteMatch&);
+  Answer<void> check(const Head&, const RouteMatch&) const;
+  Answer<void> check_origin(const Head&) const;
+
+  ExchangeRules rules_;
+  Router router_;
+  std::function<std::optional<Reply>(Request&)> fallback_;
+  Gate& uploads_;
+  HttpMetrics& metrics_;
+  LogLine log_;
+};
+
+/// The client's own X-Request-Id if it is a harmless one, else a fresh one.
+std::string request_id_of(std::string_view given);
+
+}  // namespace kiln

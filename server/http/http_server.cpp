@@ -1,0 +1,96 @@
+#include "server/http/http_server.h"
+
+#include <sys/resource.h>
+
+#include <atomic>
+#include <chrono>
+
+#include "server/http/exchange.h"
+#include "server/http/routes.h"
+
+namespace kiln {
+namespace {
+
+std::int64_t now_ms() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+}
+
+FrontOptions front_options(const HttpOptions& options) {
+  FrontOptions front = options.front;
+  front.address = options.address;
+  front.port = options.port;
+  front.threads = options.max_uploads + options.max_streams + options.max_downloads + options.quick_threads;
+  return front;
+}
+
+/// As many descriptors as the machine allows: connections are capped by us, not by EMFILE.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+Handlers all_routes(RouteContext& context) {
+  Handlers all;
+  for (Handlers part : {job_routes(context), event_routes(context), artifact_routes(context), asset_routes(context),
+                        recipe_routes(context), service_routes(context), viewer_routes()})
+    all.merge(part);
+  return all;
+}
+
+}  // namespace
+
+struct HttpServer::State {
+  Service& service;
+  Gate uploads, streams, downloads;
+  std::atomic<bool> draining{false};
+  HttpMetrics metrics;
+  RouteContext context;
+  Exchange exchange;
+  Front front;
+
+  State(const HttpOptions& options, Service& s)
+      : service(s),
+        uploads(options.max_uploads),
+        streams(options.max_streams),
+        downloads(options.max_downloads),
+        context{s, streams, downloads, draining, [this] { return metrics_text(); }},
+        exchange({options.max_upload_bytes, options.hosts}, Router(all_routes(context)), viewer_file, uploads, metrics,
+                 options.log),
+        front(front_options(options), [this](Connection& connection, std::string_view head, const std::string& peer) {
+          return exchange.serve(connection, head, peer);
+        }) {}
+
+  std::string metrics_text() {
+    MetricsInput in;
+    in.served = metrics.snapshot();
+    in.front = front.stats();
+    in.service = service.stats();
+    in.uploads = uploads.inside();
+    in.streams = streams.inside();
+    in.downloads = downloads.inside();
+    in.now_ms = now_ms();
+    return prometheus_text(in);
+  }
+};
+
+std::vector<std::string> loopback_hosts() { return {"127.0.0.1", "localhost", "[::1]"}; }
+
+HttpServer::HttpServer(HttpOptions options, Service& service) : state_(std::make_unique<State>(options, service)) {
+  raise_descriptor_limit();
+}
+
+HttpServer::~HttpServer() = default;
+
+Result<int> HttpServer::bind() { return state_->front.bind(); }
+
+void HttpServer::run() { state_->front.run(); }
+
+void HttpServer::drain() noexcept {
+  state_->draining.store(true);
+  state_->front.drain();
+}
+
+}  // namespace kiln

@@ -1,0 +1,33 @@
+#pragma once
+// The handlers of all endpoints, a file for each tag of the table.
+
+#include <atomic>
+#include <functional>
+
+#include "server/http/gate.h"
+#include "server/http/router.h"
+#include "server/work/service.h"
+
+namespace kiln {
+
+/// What handlers share. Outlives them.
+struct RouteContext {
+  Service& service;
+  Gate& streams;    // event streams and long polls
+  Gate& downloads;  // artefacts and bundles
+  const std::atomic<bool>& draining;
+  std::function<std::string()> metrics_text;
+};
+
+Handlers job_routes(RouteContext&);
+Handlers event_routes(RouteContext&);
+Handlers artifact_routes(RouteContext&);
+Handlers asset_routes(RouteContext&);
+Handlers recipe_routes(RouteContext&);
+Handlers service_routes(RouteContext&);
+Handlers viewer_routes();
+
+/// A file of the built viewer for a path without an endpoint.
+std::optional<Reply> viewer_file(Request&);
+
+}  // namespace kiln
