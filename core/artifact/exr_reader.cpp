@@ -1,0 +1,90 @@
+#include "core/artifact/exr_reader.h"
+
+#include <Imath/ImathBox.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputFile.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "core/artifact/hdr_reader.h"
+
+namespace kiln {
+namespace {
+
+using Span = std::span<const std::uint8_t>;
+
+/// Feeds OpenEXR from memory.
+class MemoryStream : public Imf::IStream {
+ public:
+  explicit MemoryStream(Span file) : Imf::IStream("environment"), file_(file) {}
+  bool read(char out[], int n) override {
+    if (n < 0 || static_cast<std::uint64_t>(n) > file_.size() - at_) throw std::runtime_error("end of file");
+    std::memcpy(out, file_.data() + at_, static_cast<std::size_t>(n));
+    at_ += static_cast<std::uint64_t>(n);
+    return at_ < file_.size();
+  }
+  std::uint64_t tellg() override { return at_; }
+  void seekg(std::uint64_t to) override { at_ = std::min<std::uint64_t>(to, file_.size()); }
+
+ private:
+  Span file_;
+  std::uint64_t at_ = 0;
+};
+
+/// Version 2 with none of: tiled 0x200, deep 0x800, multi-part 0x1000 (long names 0x400 do no harm).
+bool is_simple_scanline(Span file) {
+  constexpr unsigned kForbidden = 0x02 | 0x08 | 0x10;
+  return file.size() >= 8 && file[4] == 2 && (file[5] & kForbidden) == 0;
+}
+
+Result<Environment> read_pixels(Span file, const std::string& name) {
+  MemoryStream stream(file);
+  Imf::InputFile input(stream, 1);
+  const Imath::Box2i window = input.header().dataWindow();
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1, height = std::int64_t{window.max.y} - window.min.y + 1;
+  if (width < 1 || height < 1 || width > kMaxEnvironmentWidth || height > kMaxEnvironmentHeight) {
+    return fault("image_too_large", std::to_string(width) + " x " + std::to_string(height) + " pixels; an environment may have 8192 x 4096.", name);
+  }
+  for (const char* channel : {"R", "G", "B"}) {
+    const Imf::Channel* found = input.header().channels().findChannel(channel);
+    if (!found || found->xSampling != 1 || found->ySampling != 1) {
+      return fault("exr_unsupported", "The picture must have full channels named R, G and B.", name);
+    }
+  }
+  Environment out{.name = name, .width = static_cast<int>(width), .height = static_cast<int>(height), .radiance = {}};
+  out.radiance.resize(static_cast<std::size_t>(width * height));
+  char* base = reinterpret_cast<char*>(out.radiance.data()) -
+               (window.min.x + window.min.y * width) * static_cast<std::int64_t>(sizeof(Vec3f));
+  Imf::FrameBuffer frame;
+  const char* names[] = {"R", "G", "B"};
+  for (std::size_t c = 0; c < 3; ++c) {
+    frame.insert(names[c], Imf::Slice(Imf::FLOAT, base + c * sizeof(float), sizeof(Vec3f), static_cast<std::size_t>(width) * sizeof(Vec3f)));
+  }
+  input.setFrameBuffer(frame);
+  input.readPixels(window.min.y, window.max.y);
+  return out;
+}
+
+}  // namespace
+
+bool looks_like_exr(Span file) {
+  return file.size() >= 4 && file[0] == 0x76 && file[1] == 0x2F && file[2] == 0x31 && file[3] == 0x01;
+}
+
+Result<Environment> read_exr(Span file, const std::string& name) {
+  if (!is_simple_scanline(file)) {
+    return fault("exr_unsupported", "Deep, tiled and multi-part files are not read; save it as plain scanlines.", name);
+  }
+  try {
+    return read_pixels(file, name);
+  } catch (const std::exception&) {
+    return fault("exr_invalid", "The file cannot be read as OpenEXR.", name);
+  }
+}
+
+}  // namespace kiln
