@@ -4,11 +4,16 @@
 //   value(x, n) = irradiance / pi = radiance that leaves a white Lambertian point
 //               = 1/pi * integral over the hemisphere of n of L(x, w) (n.w) dw
 // Paper   Kajiya 1986.   Units  W m^-2 sr^-1.   Repeat  same bits for any thread count.
-// Cost    points x samples x path length closest-hit rays (one more shadow ray per vertex for local lights).
-// Error   unbiased up to `bounces`; standard error from the two halves of the samples.
-// Simple  double accumulation, no adaptivity, no reuse, no clamping.
+// Method  cosine-distributed paths; at each vertex one more ray to each environment map that is not constant, one to
+// the
+//         emitters (both joined with the path's own ray by the balance heuristic, Veach and Guibas 1995) and one to
+//         each punctual light. A path ends at the back of a single-sided face, which is black.
+// Cost    points x samples x path length closest-hit rays, and the rays above.
+// Error   unbiased up to `bounces` (albedos are limited to 0.999, as everywhere in Kiln); standard error from the two
+//         halves of the samples.
+// Simple  double accumulation, no adaptivity, no reuse, no clamping; the first directions of a point are stratified.
 
-#include <optional>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -34,7 +39,7 @@ struct ReferenceLight {
 };
 
 struct ReferenceOptions {
-  int samples = 1024;  // per point
+  int samples = 1024;  // per point; rounded up to an even number
   int bounces = -1;    // -1: until Russian roulette ends the path (unbiased); 0: direct only
   std::uint64_t seed = 0;
 };

@@ -26,6 +26,8 @@ Vec3f albedo_at(const Scene&, const SurfacePoint&);
 Vec3f emission_at(const Scene&, const SurfacePoint&);
 /// Coverage: 1 unless the material's alpha mode is mask (0 or 1) or blend.
 float opacity_at(const Scene&, const SurfacePoint&);
+/// The coverage from which a surface stops rays.
+inline constexpr float kOpaqueFrom = 0.5F;
 
 /// Bilinear (or nearest) texel fetch with wrapping, as stored: sRGB decoded when `srgb`. White when the pixels are
 /// absent.

@@ -18,8 +18,6 @@
 namespace kiln {
 namespace {
 
-constexpr float kOpaqueFrom = 0.5F;  // coverage from which a surface stops a ray
-
 /// How the tracer has to treat a part.
 enum class Coverage { full, none, varies };
 

@@ -1,0 +1,228 @@
+#include "core/trace/reference.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/base/expects.h"
+#include "core/base/random.h"
+#include "core/sphere/sampling.h"
+#include "core/sphere/sh.h"
+#include "core/trace/environment_sampler.h"
+#include "core/trace/lights.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr int kSafeBounces = 2;  // Russian roulette spares the first vertices
+
+/// A point on a surface that light arrives at, seen from the side of its normals.
+struct Vertex {
+  Vec3d position, normal, face;
+};
+
+/// Where a vertex's rays start, clear of its face.
+Vec3f lifted(const Vertex& v) {
+  return offset_origin(to_float(v.position), to_float(dot(v.normal, v.face) < 0 ? -v.face : v.face));
+}
+
+Vec3d times(const Vec3d& a, const Vec3f& b) { return a * to_double(b); }
+double largest(const Vec3d& a) { return std::max({a.x, a.y, a.z}); }
+
+/// The numbers of one path: stratified over the samples of a point at its first vertex, independent after it.
+class PathNumbers {
+ public:
+  PathNumbers(std::uint64_t seed, std::uint64_t point, std::uint64_t sample)
+      : random_(seed, point, sample),
+        index_(static_cast<std::uint32_t>(sample / 2)),
+        scrambling_(mix64(mix64(seed ^ 0x5eedULL) ^ (2 * point + sample % 2))) {}
+
+  double number() { return random_.uniform_double(); }
+  Vec2<double> pair(int depth) {
+    if (depth > 0) return {number(), number()};
+    const Vec2f u = sobol_owen(index_, scrambling_++);
+    return {u.x, u.y};
+  }
+
+ private:
+  Random random_;
+  std::uint32_t index_;
+  std::uint64_t scrambling_;  // another one for each pair
+};
+
+class Estimator {
+ public:
+  Estimator(const Tracer& tracer, const ReferenceLight& light, const ReferenceOptions& options)
+      : tracer_(tracer), scene_(tracer.scene()), light_(light), options_(options), emitters_(tracer.scene()) {
+    for (const Environment& e : light.environments) samplers_.emplace_back(e);
+  }
+
+  std::size_t lightings() const {
+    return light_.environments.size() + light_.sh.size() + (light_.scene_lights ? 1 : 0);
+  }
+
+  /// Adds one path from `start` to sum[lighting].
+  void add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+
+ private:
+  void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
+  void add_lamps(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
+  Vec3d emitter_light(const Vertex&, double pick, const Vec2<double>& u) const;
+  Vec3d punctual_light(const Vertex&, const Light&) const;
+  void add_sky(const Vec3d& w, double density, const Vec3d& weight, std::vector<Vec3d>& sum) const;
+
+  const Tracer& tracer_;
+  const Scene& scene_;
+  const ReferenceLight& light_;
+  const ReferenceOptions& options_;
+  EmitterSampler emitters_;
+  std::vector<EnvironmentSampler> samplers_;
+};
+
+/// A ray of the path left the scene along w, which it did with `density`.
+void Estimator::add_sky(const Vec3d& w, double density, const Vec3d& weight, std::vector<Vec3d>& sum) const {
+  std::size_t k = 0;
+  for (; k < light_.environments.size(); ++k) {
+    const double balance = density / (density + samplers_[k].density(w));
+    sum[k] += times(weight, environment_radiance(light_.environments[k], to_float(w))) * balance;
+  }
+  if (light_.sh.empty()) return;
+  std::array<double, sh_count(kMaxShOrder)> y;
+  evaluate_sh(light_.sh_order, w, y.data());
+  for (const std::vector<Vec3f>& coefficients : light_.sh) {
+    Vec3d radiance;
+    for (std::size_t i = 0; i < coefficients.size(); ++i) radiance += to_double(coefficients[i]) * y[i];
+    sum[k++] += weight * radiance;
+  }
+}
+
+/// One ray to the bright part of each map, where there is one.
+void Estimator::add_sky_samples(const Vertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
+                                std::vector<Vec3d>& sum) const {
+  for (std::size_t k = 0; k < samplers_.size(); ++k) {
+    if (!samplers_[k].useful()) continue;
+    const Vec3d w = samplers_[k].sample(numbers.pair(depth));
+    const double own = std::max(0.0, dot(w, v.normal)) / std::numbers::pi;
+    if (own <= 0 || tracer_.occluded(lifted(v), to_float(w), kFar)) continue;
+    const double balanced = own / (own + samplers_[k].density(w));
+    sum[k] += times(weight, environment_radiance(light_.environments[k], to_float(w))) * balanced;
+  }
+}
+
+/// Irradiance / pi from one point of the emitters, weighed against the path's own chance to find it.
+Vec3d Estimator::emitter_light(const Vertex& v, double pick, const Vec2<double>& u) const {
+  const EmitterSample to = emitters_.sample(pick, u);
+  const Vec3d way = to.position - v.position;
+  const double distance2 = dot(way, way);
+  const Vec3d w = normalized(way);
+  const double facing = -dot(w, to.normal), own = dot(w, v.normal) / std::numbers::pi;
+  if (distance2 == 0 || own <= 0 || (to.double_sided ? facing == 0 : facing <= 0)) return {};
+  const Vec3f from = lifted(v);
+  const Vec3d end = to_double(offset_origin(to_float(to.position), to_float(facing < 0 ? -to.normal : to.normal)));
+  const Vec3d clear = end - to_double(from);
+  if (tracer_.occluded(from, to_float(normalized(clear)), static_cast<float>(length(clear)))) return {};
+  const double density = to.density * distance2 / std::abs(facing);  // per solid angle
+  return to.radiance * (own / (density + own));
+}
+
+Vec3d Estimator::punctual_light(const Vertex& v, const Light& light) const {
+  const LightArrival arrival = light_arrival(light, v.position);
+  const double cosine = dot(arrival.direction, v.normal);
+  if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
+  const Vec3f from = lifted(v);
+  Vec3d w = arrival.direction;
+  double far = arrival.distance;
+  if (std::isfinite(far)) {
+    const Vec3d clear = to_double(light.position) - to_double(from);
+    w = normalized(clear), far = length(clear);
+  }
+  if (tracer_.occluded(from, to_float(w), static_cast<float>(far))) return {};
+  return arrival.irradiance * (cosine / std::numbers::pi);
+}
+
+void Estimator::add_lamps(const Vertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
+                          std::vector<Vec3d>& sum) const {
+  if (!light_.scene_lights) return;
+  Vec3d light;
+  if (!emitters_.empty()) light += emitter_light(v, numbers.number(), numbers.pair(depth));
+  for (const Light& lamp : scene_.lights) light += punctual_light(v, lamp);
+  sum.back() += weight * light;
+}
+
+void Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+  Vertex v = start;
+  Vec3d weight{1, 1, 1};
+  for (int depth = 0;; ++depth) {
+    const Vec3d local = cosine_hemisphere(numbers.pair(depth));
+    add_sky_samples(v, weight, depth, numbers, sum);
+    add_lamps(v, weight, depth, numbers, sum);
+
+    const Vec3d w = normalized(basis_around(v.normal).to_world(local));
+    const double density = std::max(local.z, 1e-30) / std::numbers::pi;
+    const Hit hit = tracer_.closest(lifted(v), to_float(w), kFar);
+    if (!hit) return add_sky(w, density, weight, sum);
+
+    const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
+    const Part& part = scene_.parts[scene_.mesh.part[hit.triangle]];
+    if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) return;
+    const double side = hit.back ? -1 : 1;
+    const Vec3d face = to_double(p.geometric_normal) * side;
+    if (light_.scene_lights && emitters_.density(hit.triangle) > 0) {
+      const double other =
+          emitters_.density(hit.triangle) * double{hit.t} * double{hit.t} / std::max(1e-12, std::abs(dot(w, face)));
+      sum.back() += times(weight, emission_at(scene_, p)) * (density / (density + other));
+    }
+
+    if (depth == options_.bounces) return;
+    weight = times(weight, albedo_at(scene_, p));
+    const double alive = std::min(1.0, largest(weight));
+    if (options_.bounces < 0 && depth >= kSafeBounces) {
+      if (numbers.number() >= alive) return;
+      weight = weight / alive;
+    }
+    if (alive <= 0) return;
+    v = {to_double(p.position), to_double(p.normal) * side, face};
+  }
+}
+
+void check_light(const ReferenceLight& light) {
+  EXPECTS(light.sh.empty() || (light.sh_order >= 1 && light.sh_order <= kMaxShOrder));
+  for (const auto& coefficients : light.sh)
+    EXPECTS(coefficients.size() == static_cast<std::size_t>(sh_count(light.sh_order)));
+}
+
+}  // namespace
+
+ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferencePoint> points,
+                                const ReferenceLight& light, const ReferenceOptions& options, Threads& threads) {
+  EXPECTS(options.samples >= 1);
+  check_light(light);
+  const Estimator estimator(tracer, light, options);
+  const std::size_t lightings = estimator.lightings();
+  const int half = (options.samples + 1) / 2;
+  const std::vector<Vec3d> zero(lightings * points.size());
+  ReferenceResult result{zero, zero, zero};
+
+  threads.for_blocks(points.size(), 1, [&](std::size_t point, std::size_t) {
+    const ReferencePoint& p = points[point];
+    const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
+    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
+    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
+      PathNumbers numbers(options.seed, point, sample);
+      estimator.add_path(start, numbers, sums[sample % 2]);
+    }
+    for (std::size_t k = 0; k < lightings; ++k) {
+      const std::size_t i = k * points.size() + point;
+      result.half_a[i] = sums[0][k] / half;
+      result.half_b[i] = sums[1][k] / half;
+      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
+    }
+  });
+  return result;
+}
+
+}  // namespace kiln
