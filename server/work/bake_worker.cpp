@@ -179,7 +179,7 @@ int bake_worker_main(int argc, char** argv) try {
   ::pthread_sigmask(SIG_BLOCK, &TermWatch::set(), nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  if (argc != 3 || ::chdir(argv[2]) != 0) return kExitInternal;
+  if (argc != 2 || ::chdir(argv[1]) != 0) return kExitInternal;
   return run_order();
 } catch (const Cancelled&) {
   return kExitCanceled;

@@ -3,7 +3,7 @@
 
 namespace kiln {
 
-/// `kilnd bake-worker FOLDER`. Reads FOLDER/job.json and inputs, writes FOLDER/out, tells on descriptor 3 (see
+/// argv: the word, FOLDER (`kilnd bake-worker FOLDER`). Reads FOLDER/job.json and inputs, writes FOLDER/out, tells on descriptor 3 (see
 /// worker_protocol.h). TERM stops it; it dies with its supervisor. Returns the exit code; never throws.
 int bake_worker_main(int argc, char** argv);
 

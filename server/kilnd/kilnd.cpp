@@ -1,0 +1,84 @@
+// kilnd: serves HTTP and supervises its workers. `kilnd bake-worker FOLDER` is such a worker.
+
+#include <signal.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+#include <thread>
+
+#include "server/http/http_server.h"
+#include "server/kilnd/options.h"
+#include "server/work/bake_worker.h"
+#include "server/work/service.h"
+#include "server/work/worker_protocol.h"
+
+namespace kiln {
+namespace {
+
+int complain(const Fault& fault) {
+  std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
+  return fault.code == "data_in_use" || fault.code == "schema_too_new" ? kExitConfig : 1;
+}
+
+sigset_t end_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  return set;
+}
+
+/// Waits for TERM or INT, which every thread blocks, and ends server and service in order.
+std::thread drain_on_signal(HttpServer& server, Service& service) {
+  return std::thread([&server, &service] {
+    const sigset_t ends = end_signals();
+    int received = 0;
+    ::sigwait(&ends, &received);
+    server.drain();   // accepts nothing more
+    service.drain();  // event streams end, running jobs go back to the queue
+  });
+}
+
+HttpOptions http_options(const DaemonOptions& options) {
+  HttpOptions http;
+  http.address = options.address;
+  http.port = options.port;
+  http.max_upload_bytes = options.max_upload_mb << 20;
+  if (is_loopback(options.address)) http.hosts = loopback_hosts();
+  if (options.quiet) http.log = {};
+  return http;
+}
+
+std::string url(const std::string& address, int port) {
+  const bool v6 = address.find(':') != std::string::npos;
+  return "http://" + (v6 ? "[" + address + "]" : address) + ":" + std::to_string(port);
+}
+
+int serve(const DaemonOptions& options) {
+  const sigset_t ends = end_signals();
+  ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the first thread
+  ::signal(SIGPIPE, SIG_IGN);
+  auto service = Service::open(options.service);
+  if (!service) return complain(service.error());
+  HttpServer server(http_options(options), **service);
+  const auto port = server.bind();
+  if (!port) return complain(port.error());
+  std::thread drain = drain_on_signal(server, **service);
+  (*service)->start();
+  std::fprintf(stderr, "kilnd listening on %s\n", url(options.address, *port).c_str());
+  server.run();
+  drain.join();
+  return 0;
+}
+
+}  // namespace
+}  // namespace kiln
+
+int main(int argc, char** argv) {
+  using namespace kiln;
+  // A worker leaves without unwinding: its results are on disk and its memory goes faster in one piece.
+  if (argc > 1 && std::string_view(argv[1]) == kWorkerWord) std::_Exit(bake_worker_main(argc - 1, argv + 1));
+  const auto options = parse_options(argc, argv);
+  return options ? serve(*options) : options.error().code;
+}

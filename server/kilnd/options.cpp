@@ -1,0 +1,86 @@
+#include "server/kilnd/options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+
+#include "core/bake/bake.h"
+
+namespace kiln {
+namespace {
+
+/// --max-upload-mb -> KILN_MAX_UPLOAD_MB
+std::string variable_of(const std::string& flag) {
+  std::string name = "KILN_" + flag.substr(2);
+  std::ranges::replace(name, '-', '_');
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return name;
+}
+
+template <class T>
+CLI::Option* add(CLI::App& app, const std::string& flag, T& value, const std::string& text) {
+  return app.add_option(flag, value, text)->envname(variable_of(flag))->capture_default_str();
+}
+
+/// Values that have no member of their own type in ServiceOptions.
+struct RawOptions {
+  std::string data = "kiln-data", worker_command;
+  double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10;
+};
+
+void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
+  add(app, "--data", raw.data, "folder of jobs and blobs; made when missing");
+  add(app, "--bind", options.address, "numeric address to listen on; all but loopback need --token-file");
+  add(app, "--port", options.port, "port to listen on; 0 picks a free one")->check(CLI::Range(0, 65535));
+  add(app, "--workers", options.service.workers, "jobs at a time, each in a process of its own")
+      ->check(CLI::Range(0, 256));
+  add(app, "--threads", options.service.threads, "threads of one worker; 0 shares the machine among the workers")
+      ->check(CLI::Range(0, 1024));
+  add(app, "--token-file", options.token_file, "file of bearer tokens, one a line; without it nobody is asked");
+  add(app, "--max-upload-mb", options.max_upload_mb, "largest upload in MiB");
+  add(app, "--max-queued", options.service.max_queued, "waiting jobs before new ones are refused with 429");
+  add(app, "--soft-free-percent", raw.soft_percent, "less free disk than this refuses uploads")
+      ->check(CLI::Range(0.0, 100.0));
+  add(app, "--hard-free-percent", raw.hard_percent, "less free disk than this lets the queue wait")
+      ->check(CLI::Range(0.0, 100.0));
+  add(app, "--blob-grace-s", raw.blob_grace_s, "how long an unused asset is kept")->check(CLI::NonNegativeNumber);
+  add(app, "--first-retry-s", raw.first_retry_s, "pause after trouble of the machine, four times longer each time")
+      ->check(CLI::NonNegativeNumber);
+  add(app, "--worker-command", raw.worker_command, "another program as worker, for tests")->group("");
+  app.add_flag("--quiet", options.quiet, "no log line per request")->envname("KILN_QUIET");
+  app.set_version_flag("--version", std::string("kilnd ") + kEngineVersion);
+}
+
+void finish(DaemonOptions& options, const RawOptions& raw) {
+  options.service.data = raw.data;
+  if (!raw.worker_command.empty()) options.service.worker_command = {raw.worker_command};
+  options.service.soft_free_fraction = raw.soft_percent / 100;
+  options.service.hard_free_fraction = raw.hard_percent / 100;
+  options.service.blob_grace = Millis(static_cast<std::int64_t>(raw.blob_grace_s * 1000));
+  options.service.first_retry = Millis(static_cast<std::int64_t>(raw.first_retry_s * 1000));
+}
+
+}  // namespace
+
+bool is_loopback(const std::string& address) { return address == "::1" || address.starts_with("127."); }
+
+tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const* argv) {
+  CLI::App app("kilnd bakes light: an HTTP server with a queue and worker processes.", "kilnd");
+  DaemonOptions options;
+  RawOptions raw;
+  add_options(app, options, raw);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return tl::make_unexpected(EarlyExit{app.exit(error) == 0 ? 0 : kExitUsage});
+  }
+  finish(options, raw);
+  if (!is_loopback(options.address) && options.token_file.empty()) {
+    std::fprintf(stderr, "kilnd: --bind %s is open to others: give --token-file as well\n", options.address.c_str());
+    return tl::make_unexpected(EarlyExit{kExitConfig});
+  }
+  return options;
+}
+
+}  // namespace kiln

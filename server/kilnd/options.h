@@ -1,0 +1,35 @@
+#pragma once
+// The command line of kilnd. Every flag is also an environment variable: --max-upload-mb is KILN_MAX_UPLOAD_MB.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/work/service.h"
+
+namespace kiln {
+
+struct DaemonOptions {
+  ServiceOptions service;
+  std::string address = "127.0.0.1";
+  int port = 7878;  // 0: any free one
+  std::string token_file;
+  std::uint64_t max_upload_mb = 8192;
+  bool quiet = false;  // no line per request
+};
+
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitConfig = 78;  // sysexits: EX_CONFIG
+
+/// What to do instead of serving: an exit code, after its text was printed.
+struct EarlyExit {
+  int code = 0;
+};
+
+/// Reads the command line. Help and mistakes are told on stdout and stderr and end the program.
+tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const* argv);
+
+/// True for addresses that only this machine reaches.
+bool is_loopback(const std::string& address);
+
+}  // namespace kiln

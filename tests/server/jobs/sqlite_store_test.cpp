@@ -1,0 +1,81 @@
+// What only the embedded engine promises: its settings, its checks, its refusals.
+
+#include "server/jobs/sqlite_store.h"
+
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace kiln {
+namespace {
+
+class SqliteStoreTest : public ::testing::Test {
+ protected:
+  SqliteStoreTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "kiln_sqlite.XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~SqliteStoreTest() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path file() const { return folder_ / "kiln.db"; }
+  /// Runs a statement on a connection of its own; SQLite's result code.
+  int run(const char* statement) const {
+    sqlite3* db = nullptr;
+    sqlite3_open(file().c_str(), &db);
+    const int code = sqlite3_exec(db, statement, nullptr, nullptr, nullptr);
+    sqlite3_close(db);
+    return code;
+  }
+  std::filesystem::path folder_;
+};
+
+Job finished_job(JobStore& store) {
+  EXPECT_TRUE(store.touch_blob(std::string(64, 'a'), 1));
+  NewJob job;
+  job.inputs.scene = {"scene.glb", std::string(64, 'a')};
+  job.content_key = "key";
+  const Job made = store.create(job).value().job;
+  return store.cancel(made.id).value();
+}
+
+TEST_F(SqliteStoreTest, TheLogIsWrittenAhead) {
+  const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_TRUE(store->check_writable());
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "kiln.db-wal"));
+}
+
+TEST_F(SqliteStoreTest, ADatabaseOfANewerProgramIsRefused) {
+  open_sqlite_store({file(), {}}).value();
+  ASSERT_EQ(run("PRAGMA user_version=999"), SQLITE_OK);
+  EXPECT_EQ(open_sqlite_store({file(), {}}).error().code, "schema_too_new");
+}
+
+TEST_F(SqliteStoreTest, AFileThatIsNoDatabaseIsRefused) {
+  std::ofstream(file()) << std::string(8192, 'x');
+  EXPECT_FALSE(open_sqlite_store({file(), {}}));
+}
+
+TEST_F(SqliteStoreTest, TheDatabaseItselfRefusesToChangeATerminalState) {
+  const auto store = open_sqlite_store({file(), {}}).value();
+  finished_job(*store);
+  EXPECT_EQ(run("UPDATE job SET state='queued', finished_at=NULL"), SQLITE_CONSTRAINT);
+}
+
+TEST_F(SqliteStoreTest, TheDatabaseItselfRefusesARunningJobWithoutAnOwner) {
+  const auto store = open_sqlite_store({file(), {}}).value();
+  finished_job(*store);
+  EXPECT_EQ(run("INSERT INTO job(id, state, label, recipe, content_key, force, created_at, run_after, request_hash) "
+                "VALUES('01ARZ3NDEKTSV4RRFFQ69G5FAV', 'running', '', '', '', 0, 0, 0, '')"),
+            SQLITE_CONSTRAINT);
+}
+
+TEST_F(SqliteStoreTest, TheDatabaseItselfRefusesToRewriteEvents) {
+  const auto store = open_sqlite_store({file(), {}}).value();
+  finished_job(*store);
+  EXPECT_EQ(run("UPDATE job_event SET message='nothing happened'"), SQLITE_CONSTRAINT);
+}
+
+}  // namespace
+}  // namespace kiln
