@@ -9,6 +9,29 @@ namespace kiln {
 namespace {
 
 using Float8 = float __attribute__((vector_size(32)));
+using Int8 = std::int32_t __attribute__((vector_size(32)));
+using Short8 = std::int16_t __attribute__((vector_size(16)));
+
+template <class Vector, class T>
+inline __attribute__((always_inline)) void load(Vector& to, const T* from) {
+  std::memcpy(&to, from, sizeof to);
+}
+
+// Columns [first, first + 8 kBlocks) of all rows; the sums stay in registers.
+template <int kBlocks>
+inline __attribute__((always_inline)) void add_columns(std::span<const std::int16_t* const> rows, int first,
+                                                       std::int32_t* sum) {
+  Int8 total[kBlocks];
+  std::memcpy(total, sum + first, sizeof total);
+  for (const std::int16_t* row : rows) {
+    for (int b = 0; b < kBlocks; ++b) {
+      Short8 piece;
+      load(piece, row + first + b * 8);
+      total[b] += __builtin_convertvector(piece, Int8);
+    }
+  }
+  std::memcpy(sum + first, total, sizeof total);
+}
 
 template <int kBlocks>
 inline __attribute__((always_inline)) void add_blocks(const float* rows, std::uint32_t mask, float* sum) {
@@ -18,7 +41,7 @@ inline __attribute__((always_inline)) void add_blocks(const float* rows, std::ui
     const float* row = rows + std::countr_zero(mask) * kBlocks * 8;
     for (int b = 0; b < kBlocks; ++b) {
       Float8 piece;
-      std::memcpy(&piece, row + b * 8, sizeof piece);
+      load(piece, row + b * 8);
       total[b] += piece;
     }
   }
@@ -48,6 +71,27 @@ __attribute__((target_clones("avx2", "default"))) void add_rows(const float* row
       return add_blocks<13>(rows, mask, sum);  // 10
     default:
       EXPECTS(!"a row width of an SH order");
+  }
+}
+
+__attribute__((target_clones("avx2", "default"))) void add_short_rows(std::span<const std::int16_t* const> rows,
+                                                                      int width, std::int32_t* sum) {
+  int first = 0;
+  for (; first + 56 <= width; first += 56) add_columns<7>(rows, first, sum);
+  for (; first + 24 <= width; first += 24) add_columns<3>(rows, first, sum);
+  for (; first < width; first += 8) add_columns<1>(rows, first, sum);
+}
+
+__attribute__((target_clones("avx2", "default"))) void add_weighted_row(const std::int16_t* row, const float* weight,
+                                                                        int width, float* sum) {
+  for (int i = 0; i < width; i += 8) {
+    Short8 piece;
+    Float8 scale, total;
+    load(piece, row + i);
+    load(scale, weight + i);
+    load(total, sum + i);
+    total += scale * __builtin_convertvector(__builtin_convertvector(piece, Int8), Float8);
+    std::memcpy(sum + i, &total, sizeof total);
   }
 }
 

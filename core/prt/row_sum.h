@@ -1,12 +1,19 @@
 #pragma once
-// Adds table rows: the inner loop of projection.
+// Adds table rows: the inner loops of projection and of gathering.
+// Repeat  the same bits on any machine: no fused operations, one order
 
 #include <cstdint>
+#include <span>
 
 namespace kiln {
 
 /// sum[0 .. width) += rows[r * width ...] for every bit r of `mask`. width is a multiple of 8, at most 104.
-/// The same bits on any machine: no fused operations, one order.
 void add_rows(const float* rows, int width, std::uint32_t mask, float* sum);
+
+/// sum[0 .. width) += each row. width is a multiple of 8. Exact while a sum stays below 2^31: 65536 rows.
+void add_short_rows(std::span<const std::int16_t* const> rows, int width, std::int32_t* sum);
+
+/// sum[i] += weight[i] * row[i]. width is a multiple of 8.
+void add_weighted_row(const std::int16_t* row, const float* weight, int width, float* sum);
 
 }  // namespace kiln

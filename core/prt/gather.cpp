@@ -1,0 +1,127 @@
+#include "core/prt/gather.h"
+
+#include <algorithm>
+
+#include "core/prt/row_sum.h"
+#include "core/sphere/sh.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+void prefetch_row(const std::int16_t* row, int stride) {
+  const auto* bytes = reinterpret_cast<const char*>(row);
+  for (int line = 0; line < stride * 2; line += 64) __builtin_prefetch(bytes + line);
+}
+
+}  // namespace
+
+Gatherer::Gatherer(const GatherSource& source) : source_(source) {
+  const auto stride = static_cast<std::size_t>(source.rows.stride());
+  plain_sum_.resize(stride);
+  textured_sum_.resize(stride);
+  weight_.resize(stride);
+  path_sum_.resize(static_cast<std::size_t>(3 * sh_count(source.order)));
+  result_.resize(static_cast<std::size_t>(source.rows.width()));
+}
+
+void Gatherer::gather(const TransferPoint& point) {
+  const std::uint64_t key = point_key(point) + static_cast<std::uint64_t>(source_.pass);
+  const LocalFrame frame = local_frame(source_.sets, point.normal, source_.seed, key);
+  random_ = Random(source_.seed, key, 1);
+  for (auto* sum : {&textured_sum_, &path_sum_}) std::fill(sum->begin(), sum->end(), 0.0F);
+  std::fill(plain_sum_.begin(), plain_sum_.end(), 0);
+  fixed_ = {};
+
+  const Vec3f origin = ray_origin(point);
+  for (Packet& p : packets_) {
+    p.rays.ox.fill(origin.x), p.rays.oy.fill(origin.y), p.rays.oz.fill(origin.z), p.rays.far.fill(kFar);
+  }
+  const int count = source_.sets.samples() / kPacket;
+  for (int step = 0; step < count + 2; ++step) {
+    if (step < count) trace(packets_[static_cast<std::size_t>(step % 3)], frame, step);
+    if (step >= 1 && step < count + 1) choose(packets_[static_cast<std::size_t>((step - 1) % 3)]);
+    if (step >= 2) add(packets_[static_cast<std::size_t>((step - 2) % 3)]);
+  }
+  rays_ += static_cast<std::uint64_t>(source_.sets.samples());
+  finish();
+}
+
+void Gatherer::trace(Packet& packet, const LocalFrame& frame, int index) {
+  source_.sets.turn(frame.set, index, frame.basis, packet.rays);
+  source_.tracer.closest16(packet.rays, packet.hits);
+  const std::vector<Triangle>& triangles = source_.tracer.scene().mesh.triangles;
+  for (const std::uint32_t t : packet.hits.triangle) {
+    if (t == kNoHit) continue;
+    __builtin_prefetch(&triangles[t]);
+    source_.faces.prefetch(t);
+  }
+}
+
+void Gatherer::choose(Packet& packet) {
+  const std::vector<Triangle>& triangles = source_.tracer.scene().mesh.triangles;
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < kPacket; ++i, bits >>= 16) {
+    if (i % 4 == 0) bits = random_.next();
+    const std::uint32_t t = packet.hits.triangle[i];
+    packet.vertex[i] = kNoHit;
+    if (t == kNoHit) continue;
+    const HitSide side = source_.faces.side(t, {packet.rays.dx[i], packet.rays.dy[i], packet.rays.dz[i]});
+    if (side == HitSide::flipped) add_flipped(packet, i);
+    if (side != HitSide::front) continue;
+    const float pick = (static_cast<float>(bits & 0xffffU) + 0.5F) * 0x1p-16F;
+    const float u = packet.hits.u[i], v = packet.hits.v[i];
+    const std::uint32_t vertex = triangles[t][pick < u ? 1 : pick < u + v ? 2 : 0];
+    packet.vertex[i] = vertex;
+    prefetch_row(source_.rows.row(vertex), source_.rows.stride());
+    if (!source_.fixed.empty()) __builtin_prefetch(&source_.fixed[vertex]);
+  }
+}
+
+void Gatherer::add(const Packet& packet) {
+  std::array<const std::int16_t*, kPacket> rows;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const std::uint32_t vertex = packet.vertex[i];
+    if (vertex == kNoHit) continue;
+    if (source_.faces.is_plain(packet.hits.triangle[i])) {
+      rows[count++] = source_.rows.row(vertex);
+      if (!source_.fixed.empty()) fixed_ += source_.fixed[vertex];
+    } else {
+      add_textured(packet, i);
+    }
+  }
+  if (count > 0) add_short_rows(std::span(rows).first(count), source_.rows.stride(), plain_sum_.data());
+}
+
+void Gatherer::add_textured(const Packet& packet, std::size_t lane) {
+  const SurfacePoint hit{.triangle = packet.hits.triangle[lane], .u = packet.hits.u[lane], .v = packet.hits.v[lane]};
+  const Vec3f albedo = albedo_at(source_.tracer.scene(), hit);
+  const int count = sh_count(source_.order);
+  for (int c = 0; c < source_.channels; ++c)
+    std::fill_n(weight_.begin() + c * count, count, albedo[static_cast<std::size_t>(c)]);
+  const std::uint32_t vertex = packet.vertex[lane];
+  add_weighted_row(source_.rows.row(vertex), weight_.data(), source_.rows.stride(), textured_sum_.data());
+  if (!source_.fixed.empty()) fixed_ += albedo * source_.fixed[vertex];
+}
+
+void Gatherer::add_flipped(const Packet& packet, std::size_t lane) {
+  const FlippedHit hit{.triangle = packet.hits.triangle[lane],
+                       .u = packet.hits.u[lane],
+                       .v = packet.hits.v[lane],
+                       .direction = {packet.rays.dx[lane], packet.rays.dy[lane], packet.rays.dz[lane]},
+                       .reflections = source_.pass};
+  const PathSum sum{source_.order, path_sum_.data(), source_.fixed.empty() ? nullptr : &fixed_};
+  rays_ += static_cast<std::uint64_t>(add_flipped_path(source_.tracer, source_.lamps, hit, random_, sum));
+}
+
+void Gatherer::finish() {
+  const float weight = 1.0F / static_cast<float>(source_.sets.samples());
+  for (std::size_t i = 0; i < result_.size(); ++i) {
+    const float rows = source_.rows.unit(static_cast<int>(i)) * (static_cast<float>(plain_sum_[i]) + textured_sum_[i]);
+    result_[i] = weight * (rows + path_sum_[i]);
+  }
+  fixed_ *= weight;
+}
+
+}  // namespace kiln

@@ -1,0 +1,68 @@
+#pragma once
+// One pass of interreflection at one vertex: (K T)(x) from closest-hit rays.
+//
+// A ray takes the stored vector of one corner of the face it hits, drawn with its barycentric as probability: the
+// expectation is the interpolated vector, at a third of the memory traffic. Rows of parts with one albedo are stored
+// multiplied by it, so most hits are a sum of integers; other hits weigh the row by the albedo at the hit.
+// Three packets are in flight (trace, choose, add), so that memory is asked for before it is needed.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/prt/direction_sets.h"
+#include "core/prt/flipped_path.h"
+#include "core/prt/gather_faces.h"
+#include "core/prt/packed_rows.h"
+#include "core/prt/ray_origin.h"
+
+namespace kiln {
+
+/// What a pass reads. `fixed` is empty or one RGB a vertex; it and `rows` hold exit light on plain parts.
+struct GatherSource {
+  const Tracer& tracer;
+  const Lamps& lamps;
+  const GatherFaces& faces;
+  const DirectionSets& sets;
+  const PackedRows& rows;
+  const std::vector<Vec3f>& fixed;
+  int order = 6;
+  int channels = 3;
+  int pass = 0;  // reflections already in `rows`
+  std::uint64_t seed = 0;
+};
+
+/// Sums of one vertex, and room to work in. One for each block of vertices.
+class Gatherer {
+ public:
+  explicit Gatherer(const GatherSource&);
+
+  /// (K T) at a point: channels x order^2 numbers in result(), and the lamp light in fixed().
+  void gather(const TransferPoint&);
+  std::span<const float> result() const { return result_; }
+  const Vec3f& fixed() const { return fixed_; }
+  std::uint64_t rays() const { return rays_; }
+
+ private:
+  struct Packet {
+    Rays16 rays;
+    Hits16 hits;
+    std::array<std::uint32_t, kPacket> vertex;  // the corner drawn, or kNoHit
+  };
+  void trace(Packet&, const LocalFrame&, int packet);
+  void choose(Packet&);
+  void add(const Packet&);
+  void add_textured(const Packet&, std::size_t lane);
+  void add_flipped(const Packet&, std::size_t lane);
+  void finish();
+
+  const GatherSource& source_;
+  std::array<Packet, 3> packets_;
+  Random random_{0, 0};
+  std::vector<std::int32_t> plain_sum_;
+  std::vector<float> textured_sum_, weight_, path_sum_, result_;
+  Vec3f fixed_;
+  std::uint64_t rays_ = 0;
+};
+
+}  // namespace kiln

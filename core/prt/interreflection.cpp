@@ -1,0 +1,158 @@
+#include "core/prt/interreflection.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <optional>
+
+#include "core/base/expects.h"
+#include "core/prt/gather.h"
+#include "core/prt/morton.h"
+#include "core/prt/support_tree.h"
+
+namespace kiln {
+namespace {
+
+constexpr int kSets = 8;            // of directions only: 12 bytes a ray
+constexpr std::size_t kBlock = 64;  // vertices of a unit of work
+
+bool is_grey(const std::vector<Vec3f>& light) {
+  return std::all_of(light.begin(), light.end(), [](const Vec3f& x) { return x.x == x.y && x.y == x.z; });
+}
+
+// Vectors of one pass: rows for distant light, RGB for lamps.
+struct Layer {
+  PackedRows rows;
+  std::vector<Vec3f> fixed;
+};
+
+class Solver {
+ public:
+  Solver(const Tracer& tracer, std::vector<float> direct, std::vector<Vec3f> fixed, const Interreflection& params)
+      : tracer_(tracer),
+        mesh_(tracer.scene().mesh),
+        params_(params),
+        faces_(tracer.scene()),
+        lamps_(tracer),
+        channels_((faces_.grey() || params.bounces == 0) && is_grey(fixed) ? 1 : 3),
+        face_of_(widest_faces(mesh_)),
+        direct_(mesh_.position.size(), params.order, 1),
+        fixed_direct_(std::move(fixed)) {
+    const auto count = static_cast<std::size_t>(sh_count(params.order));
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v) direct_.store(v, direct.data() + v * count);
+  }
+
+  Transfer solve(Threads& threads, TransferStats* stats) {
+    Layer light = layer();  // T_0 = D
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v)
+      store(light, v, direct_row(v), fixed_at(v), params_.bounces > 0);
+    if (params_.bounces > 0) iterate(light, threads, stats);
+    direct_.release_before(~std::size_t{0});
+    return unpack(light);
+  }
+
+ private:
+  using Row = std::array<float, 3 * sh_count(kMaxShOrder)>;
+  std::size_t count() const { return static_cast<std::size_t>(sh_count(params_.order)); }
+
+  Layer layer() const { return {PackedRows(mesh_.position.size(), params_.order, channels_), fixed_direct_}; }
+
+  Row direct_row(std::size_t v) const {
+    Row row;
+    direct_.load(v, row.data());
+    for (int c = 1; c < channels_; ++c)
+      std::copy_n(row.data(), count(), row.data() + static_cast<std::size_t>(c) * count());
+    return row;
+  }
+  Vec3f fixed_at(std::size_t v) const { return fixed_direct_.empty() ? Vec3f{} : fixed_direct_[v]; }
+
+  // Stores T, or on a part of one albedo the light that leaves it, when another pass will read it.
+  void store(Layer& to, std::size_t v, Row row, Vec3f fixed, bool exit) const {
+    if (exit && face_of_[v] != kNoFace && faces_.is_plain(face_of_[v])) {
+      const Vec3f albedo = faces_.plain(mesh_.part[face_of_[v]]);
+      for (int c = 0; c < channels_; ++c) {
+        for (std::size_t i = 0; i < count(); ++i)
+          row[static_cast<std::size_t>(c) * count() + i] *= albedo[static_cast<std::size_t>(c)];
+      }
+      fixed = fixed * albedo;
+    }
+    to.rows.store(v, row.data());
+    if (!to.fixed.empty()) to.fixed[v] = fixed;
+  }
+
+  // T_{k+1} = D + K T_k, `bounces` times.
+  void iterate(Layer& light, Threads& threads, TransferStats* stats) {
+    const DirectionSets sets(0, params_.samples, kSets, mix64(params_.seed));
+    const SupportTree support(mesh_.position);
+    const std::vector<std::uint32_t> order = morton_order(mesh_.position);
+    Layer next = layer();
+    for (int pass = 0; pass < params_.bounces; ++pass) {
+      const GatherSource source{tracer_,     lamps_,        faces_,    sets, light.rows,
+                                light.fixed, params_.order, channels_, pass, params_.seed};
+      std::atomic<std::uint64_t> rays = 0;
+      threads.for_blocks(order.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+        Gatherer gatherer(source);
+        for (std::size_t i = begin; i < end; ++i) update(order[i], support, gatherer, pass, next);
+        rays += gatherer.rays();
+      });
+      if (stats != nullptr) stats->rays += rays;
+      std::swap(light, next);
+    }
+  }
+
+  void update(std::uint32_t v, const SupportTree& support, Gatherer& gatherer, int pass, Layer& next) const {
+    Row row = direct_row(v);
+    Vec3f fixed = fixed_at(v);
+    const Vec3f& n = mesh_.normal[v];
+    if (support.rises_above(n, dot(n, mesh_.position[v]) + kOpenTolerance)) {
+      gatherer.gather(vertex_point(mesh_, v, face_of_[v]));
+      const std::span<const float> reflected = gatherer.result();
+      for (std::size_t i = 0; i < reflected.size(); ++i) row[i] += reflected[i];
+      fixed += gatherer.fixed();
+    }
+    store(next, v, row, fixed, pass + 1 < params_.bounces);
+  }
+
+  // Frees packed rows as it goes, so that packed and unpacked light are never held whole together.
+  Transfer unpack(Layer& light) const {
+    Transfer out{.order = params_.order, .channels = channels_, .fixed = !fixed_direct_.empty(), .coefficients = {}};
+    out.coefficients.reserve(mesh_.position.size() * out.stride());
+    Row row;
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
+      light.rows.load(v, row.data());
+      light.rows.release_before(v);
+      for (int c = 0; c < channels_; ++c) {
+        const float* channel = row.data() + static_cast<std::size_t>(c) * count();
+        out.coefficients.insert(out.coefficients.end(), channel, channel + count());
+        if (out.fixed) out.coefficients.push_back(light.fixed[v][static_cast<std::size_t>(c)]);
+      }
+    }
+    return out;
+  }
+
+  const Tracer& tracer_;
+  const Mesh& mesh_;
+  const Interreflection& params_;
+  GatherFaces faces_;
+  Lamps lamps_;
+  int channels_;
+  std::vector<std::uint32_t> face_of_;
+  PackedRows direct_;
+  std::vector<Vec3f> fixed_direct_;
+};
+
+}  // namespace
+
+Transfer bake_interreflection(const Tracer& tracer, const Mesh& mesh, std::vector<float> direct,
+                              std::vector<Vec3f> fixed_direct, const Interreflection& params, Threads& threads,
+                              TransferStats* stats) {
+  EXPECTS(params.order >= 1 && params.order <= kMaxShOrder);
+  EXPECTS(params.bounces >= 0 && params.samples >= 1 && params.samples <= 65536);
+  EXPECTS(mesh.position.size() == tracer.scene().mesh.position.size());
+  EXPECTS(direct.size() == mesh.position.size() * static_cast<std::size_t>(sh_count(params.order)));
+  EXPECTS(fixed_direct.empty() || fixed_direct.size() == mesh.position.size());
+  Solver solver(tracer, std::move(direct), std::move(fixed_direct), params);
+  return solver.solve(threads, stats);
+}
+
+}  // namespace kiln

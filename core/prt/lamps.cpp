@@ -1,0 +1,122 @@
+#include "core/prt/lamps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/random.h"
+#include "core/prt/ray_origin.h"
+#include "core/sphere/sampling.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+constexpr double kInversePi = std::numbers::inv_pi;
+constexpr double kShortfall = 1 - 4e-6;  // a shadow ray ends this fraction before its lamp, which would stop it
+
+bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
+  return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
+}
+
+void set_lane(Rays16& rays, std::size_t i, const Vec3d& direction, double far) {
+  const Vec3f w = to_float(direction);
+  rays.dx[i] = w.x, rays.dy[i] = w.y, rays.dz[i] = w.z;
+  rays.far[i] = static_cast<float>(far);
+}
+
+void set_origin(Rays16& rays, const Vec3f& origin) {
+  rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z);
+}
+
+}  // namespace
+
+Vec3f Lamps::punctual(const Receiver& at) const {
+  Vec3d sum;
+  for (const Light& light : tracer_.scene().lights) {
+    const LightArrival arrival = light_arrival(light, to_double(at.origin));
+    const double cosine = dot(arrival.direction, to_double(at.normal));
+    if (cosine <= 0 || arrival.irradiance == Vec3d{}) continue;
+    const double far = std::min(arrival.distance * kShortfall, double{kFar});
+    if (tracer_.occluded(at.origin, to_float(arrival.direction), static_cast<float>(far))) continue;
+    sum += arrival.irradiance * (cosine * kInversePi);
+  }
+  return to_float(sum);
+}
+
+Vec3f Lamps::emitted(const Receiver& at, int samples, std::uint64_t seed) const {
+  if (emitters_.empty()) return {};
+  const Shares shares{static_cast<double>(samples), static_cast<double>(cosine_share(samples))};
+  return to_float(from_points(at, shares, mix64(seed)) + from_rays(at, shares, mix64(seed + 1)));
+}
+
+Vec3d Lamps::from_points(const Receiver& at, const Shares& shares, std::uint64_t seed) const {
+  const Vec3d origin = to_double(at.origin), normal = to_double(at.normal);
+  Vec3d sum;
+  for (int first = 0; first < static_cast<int>(shares.area); first += kPacket) {
+    const int count = std::min(kPacket, static_cast<int>(shares.area) - first);
+    Rays16 rays;
+    set_origin(rays, at.origin);
+    std::array<Vec3d, kPacket> light{};
+    for (int i = 0; i < count; ++i) {
+      // One stratified pair: the first number picks the triangle, what is left of it and the second a point there.
+      const auto index = static_cast<std::uint32_t>(first + i);
+      const Vec2f u = sobol_owen(index, seed), v = sobol_owen(index, ~seed);
+      const EmitterSample s = emitters_.sample(u.x, {v.x, v.y});
+      const Vec3d way = s.position - origin;
+      const double distance = length(way);
+      const Vec3d w = normalized(way);
+      set_lane(rays, static_cast<std::size_t>(i), w, distance * kShortfall);
+      const double cosine = dot(w, normal), facing = s.double_sided ? std::abs(dot(w, s.normal)) : -dot(w, s.normal);
+      if (cosine <= 0 || facing <= 0) continue;
+      const double solid_density = s.density * distance * distance / facing;
+      const double weight = cosine * kInversePi / (shares.area * solid_density + shares.cosine * cosine * kInversePi);
+      light[static_cast<std::size_t>(i)] = s.radiance * weight;
+    }
+    const std::uint32_t hidden = tracer_.occluded16(rays, count);
+    for (int i = 0; i < count; ++i) {
+      if ((hidden >> i & 1U) == 0) sum += light[static_cast<std::size_t>(i)];
+    }
+  }
+  return sum;
+}
+
+Vec3d Lamps::from_rays(const Receiver& at, const Shares& shares, std::uint64_t seed) const {
+  const Basis<float> basis = basis_around(at.normal);
+  Vec3d sum;
+  for (int first = 0; first < static_cast<int>(shares.cosine); first += kPacket) {
+    const int count = std::min(kPacket, static_cast<int>(shares.cosine) - first);
+    Rays16 rays;
+    set_origin(rays, at.origin);
+    std::array<Vec3f, kPacket> local;
+    for (int i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      local[k] = cosine_hemisphere(sobol_owen(static_cast<std::uint32_t>(first + i), seed));
+      set_lane(rays, k, to_double(basis.to_world(local[k])), kFar);
+    }
+    Hits16 hits;
+    tracer_.closest16(rays, hits, count);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      if (hits.triangle[i] == kNoHit) continue;
+      const double density = emitters_.density(hits.triangle[i]);
+      if (density <= 0) continue;
+      const Vec3f w{rays.dx[i], rays.dy[i], rays.dz[i]};
+      const SurfacePoint p = surface_point(tracer_.scene(), hits.triangle[i], hits.u[i], hits.v[i]);
+      const double facing = std::abs(dot(w, p.geometric_normal));
+      const double solid_density = density * hits.t[i] * hits.t[i] / std::max(facing, 1e-12);
+      const double cosine = local[i].z * kInversePi;
+      const double weight = cosine / (shares.area * solid_density + shares.cosine * cosine);
+      sum += to_double(emission(hits.triangle[i], hits.u[i], hits.v[i], w)) * weight;
+    }
+  }
+  return sum;
+}
+
+Vec3f Lamps::emission(std::uint32_t triangle, float u, float v, const Vec3f& direction) const {
+  const Scene& scene = tracer_.scene();
+  const SurfacePoint p = surface_point(scene, triangle, u, v);
+  if (dot(p.geometric_normal, direction) >= 0 && !is_double_sided(scene, triangle)) return {};
+  return emission_at(scene, p);
+}
+
+}  // namespace kiln
