@@ -72,7 +72,7 @@ TEST(Transfer, TracedOpenPointAgreesWithTheClosedForm) {
   }
 }
 
-TEST(Transfer, PointAtTheFootOfAnEndlessWallSeesHalfTheSky) {
+TEST(Transfer, PointAtTheFootOfAWallSeesHalfTheSky) {
   Scene scene = testing::empty_scene();
   testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -0.5F}, 10, 10);  // floor, z from 0 to 0.5
   testing::add_grid(scene, {-0.5F, 0, 0}, {1, 0, 0}, {0, 0.5F, 0}, 10, 10);      // wall at z = 0
