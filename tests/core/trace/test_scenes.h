@@ -46,9 +46,9 @@ inline void add_room(Scene& scene, float h, int material) {
   add_quad(scene, low, z, x, material);     // floor, looks up
   add_quad(scene, low, x, y, material);     // looks along +z
   add_quad(scene, low, y, z, material);     // looks along +x
-  add_quad(scene, high, -z, -x, material);  // ceiling
-  add_quad(scene, high, -x, -y, material);
-  add_quad(scene, high, -y, -z, material);
+  add_quad(scene, high, -x, -z, material);  // ceiling
+  add_quad(scene, high, -y, -x, material);
+  add_quad(scene, high, -z, -y, material);
 }
 
 /// A sphere of latitude rings, fronts outwards, smooth normals; centre at the origin.
