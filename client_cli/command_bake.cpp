@@ -1,0 +1,59 @@
+// kiln bake IN: from a scene to a folder of artefacts, in this process or on a server.
+#include <filesystem>
+
+#include "client_cli/bake_result.h"
+#include "client_cli/commands.h"
+#include "client_cli/files.h"
+#include "client_cli/models.h"
+#include "client_cli/progress_bar.h"
+#include "client_cli/recipe_input.h"
+#include "client_cli/remote_bake.h"
+#include "core/bake/bake.h"
+
+namespace kiln {
+namespace {
+
+Outcome<BakeInput> bake_input(const std::string& path, const RecipeOptions& options) {
+  KILN_TRY(loaded, load_recipe(options, false));
+  KILN_TRY(recipe, checked_recipe(loaded));
+  KILN_TRY(files, load_files(path));
+  BakeInput input;
+  input.scene = std::move(files);
+  input.recipe = std::move(recipe);
+  input.environment = std::move(loaded.environment);
+  input.environment_name = loaded.environment_name;
+  return input;
+}
+
+Outcome<BakeOutput> bake_here(const BakeInput& input, Session& session) {
+  Threads threads(input.recipe.limits.threads);
+  const StopTogether together(session.interrupt, threads);
+  ProgressBar bar(session.terminal);
+  return or_failure(bake(
+      input, [&](const ProgressEvent& event) { bar.update(event); }, threads));
+}
+
+Outcome<BakedFiles> write_artifacts(const BakeOutput& output, const std::string& folder) {
+  const Outcome<void> made = make_folder(folder);
+  if (!made) return tl::make_unexpected(made.error());
+  BakedFiles files{folder, {}, {}};
+  for (const ArtifactFile& file : output.files) {
+    const Outcome<void> written = write_file((std::filesystem::path(folder) / file.name).string(), file.bytes);
+    if (!written) return tl::make_unexpected(written.error());
+    files.names.push_back(file.name);
+    if (file.name == "report.json") files.report.assign(file.bytes.begin(), file.bytes.end());
+  }
+  return files;
+}
+
+}  // namespace
+
+Outcome<ExitCode> run(const BakeOptions& options, Session& session) {
+  if (!session.common.server.empty()) return bake_remotely(options, session);
+  KILN_TRY(input, bake_input(options.input, options.recipe));
+  KILN_TRY(output, bake_here(input, session));
+  KILN_TRY(files, write_artifacts(output, output_folder(options.output, options.input)));
+  return show_bake(files, options.max_error, session);
+}
+
+}  // namespace kiln

@@ -1,0 +1,26 @@
+// kiln eval FILE --points P.csv: light values from an artefact, decoded exactly as delivered.
+#include "client_cli/commands.h"
+#include "client_cli/light_lookup.h"
+#include "client_cli/models.h"
+#include "client_cli/recipe_input.h"
+#include "client_cli/value_output.h"
+
+namespace kiln {
+
+Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
+  KILN_TRY(points, read_points(options.points));
+  KILN_TRY(baked, load_artefact(options.file));
+  KILN_TRY(environment, load_light(options.light));
+  const std::vector<Vec3f> light =
+      environment ? project_environment(*environment, baked.transfer.order) : baked.light.coefficients;
+  if (!environment) {
+    say(light.empty() ? "the artefact's own lamps" : "the light it was baked with: " + baked.light.name);
+  }
+  Threads threads;
+  const StopTogether together(session.interrupt, threads);
+  const Places places = place_points(baked.scene, points, threads);
+  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo}), false};
+  return write_values(table, baked.scene.frame.scale, options.output, session);
+}
+
+}  // namespace kiln

@@ -1,0 +1,172 @@
+// kiln inspect FILE: what an artefact (or a plain scene) holds.
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "client_cli/commands.h"
+#include "client_cli/files.h"
+#include "client_cli/models.h"
+#include "client_cli/report_text.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+json scene_facts(const Scene& scene) {
+  std::uint64_t image_bytes = 0;
+  for (const Image& image : scene.images) image_bytes += image.encoded.size();
+  json warnings = json::array();
+  for (const Warning& w : scene.warnings)
+    warnings.push_back({{"code", w.code}, {"message", w.message}, {"where", w.where}});
+  return {{"triangles", scene.mesh.triangles.size()},
+          {"vertices", scene.mesh.position.size()},
+          {"parts", scene.parts.size()},
+          {"materials", scene.materials.size()},
+          {"textures", scene.textures.size()},
+          {"images", scene.images.size()},
+          {"image_bytes", image_bytes},
+          {"lights", scene.lights.size()},
+          {"world_center", {scene.frame.center.x, scene.frame.center.y, scene.frame.center.z}},
+          {"world_size", scene.frame.scale},
+          {"warnings", warnings}};
+}
+
+/// Every attribute of the file's primitives with its accessor type and number of elements.
+json attributes_of(const json& gltf) {
+  json out = json::object();
+  for (const json& mesh : gltf.value("meshes", json::array())) {
+    for (const json& primitive : mesh.value("primitives", json::array())) {
+      const json attributes = primitive.value("attributes", json::object());
+      for (const auto& [name, accessor] : attributes.items()) {
+        const json& used = gltf.at("accessors").at(accessor.get<std::size_t>());
+        out[name]["type"] = used.at("type");
+        out[name]["elements"] = out[name].value("elements", std::uint64_t{0}) + used.at("count").get<std::uint64_t>();
+      }
+    }
+  }
+  return out;
+}
+
+/// Bytes of the views that hold Draco geometry.
+std::uint64_t draco_bytes(const json& gltf) {
+  std::vector<std::size_t> views;
+  for (const json& mesh : gltf.value("meshes", json::array())) {
+    for (const json& primitive : mesh.value("primitives", json::array())) {
+      const auto pointer = json::json_pointer("/extensions/KHR_draco_mesh_compression/bufferView");
+      if (primitive.contains(pointer)) views.push_back(primitive[pointer].get<std::size_t>());
+    }
+  }
+  std::sort(views.begin(), views.end());
+  views.erase(std::unique(views.begin(), views.end()), views.end());
+  std::uint64_t bytes = 0;
+  for (const std::size_t view : views) bytes += gltf.at("bufferViews").at(view).at("byteLength").get<std::uint64_t>();
+  return bytes;
+}
+
+json light_facts(const BakedScene& baked) {
+  const Transfer& t = baked.transfer;
+  return {{"order", t.order},           {"coefficients", sh_count(t.order)},
+          {"channels", t.channels},     {"fixed", t.fixed},
+          {"slots", t.slots()},         {"baked_light", baked.light.name},
+          {"exposure", baked.exposure}, {"provenance", json::parse(baked.provenance, nullptr, false)}};
+}
+
+json certificate_beside(const std::string& path) {
+  const auto report = (std::filesystem::path(path).parent_path() / "report.json").string();
+  if (!file_exists(report)) return nullptr;
+  const auto text = read_text(report);
+  const json document = text ? json::parse(*text, nullptr, false) : json();
+  return document.is_object() && document.contains("certificate") ? document["certificate"] : json();
+}
+
+json facts_of_json(std::string_view text) {
+  const json gltf = json::parse(text, nullptr, false);
+  if (!gltf.is_object()) return json::object();
+  try {
+    return {{"attributes", attributes_of(gltf)},
+            {"draco_bytes", draco_bytes(gltf)},
+            {"extensions", gltf.value("extensionsUsed", json::array())}};
+  } catch (const json::exception&) {  // the readers have judged this file; facts of a strange one are just left out
+    return json::object();
+  }
+}
+
+Outcome<json> facts_of(const std::string& path) {
+  KILN_TRY(bytes, read_file(path));
+  json facts = {{"file", base_name(path)}, {"bytes", bytes.size()}};
+  if (kind_of(bytes) == FileKind::artefact) {
+    KILN_TRY(baked, load_artefact(path));
+    facts["kind"] = "artefact";
+    facts["light"] = light_facts(baked);
+    facts["certificate"] = certificate_beside(path);
+    facts.update(scene_facts(baked.scene));
+    facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) /
+                                static_cast<double>(std::max<std::size_t>(1, baked.scene.mesh.position.size()));
+  } else {
+    KILN_TRY(scene, load_scene(path));
+    facts["kind"] = "scene";
+    facts.update(scene_facts(scene));
+  }
+  facts.update(facts_of_json(gltf_json(bytes)));
+  return facts;
+}
+
+std::string line(const char* name, const std::string& value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%-14s ", name);
+  return text + value + "\n";
+}
+
+std::string count(const json& facts, const char* name) { return facts[name].dump() + " " + name; }
+
+std::string light_lines(const json& light) {
+  const std::string channels = light["channels"] == 1 ? "grey" : "RGB";
+  std::string out =
+      line("transfer", "order " + light["order"].dump() + ": " + light["coefficients"].dump() + " coefficients, " +
+                           channels + (light["fixed"] == true ? ", and the light of the scene's own lamps" : ""));
+  const auto name = light["baked_light"].get<std::string>();
+  out += line("baked light", name.empty() ? "none" : name);
+  if (light["provenance"].is_object() && !light["provenance"].empty())
+    out += line("provenance", light["provenance"].dump());
+  return out;
+}
+
+std::string facts_text(const json& facts) {
+  std::string out = line("file", facts["file"].get<std::string>() + " (" + facts["kind"].get<std::string>() + "), " +
+                                     human_bytes(facts["bytes"].get<double>()));
+  out += line("geometry", count(facts, "triangles") + ", " + count(facts, "vertices") + ", " + count(facts, "parts"));
+  out += line("looks", count(facts, "materials") + ", " + count(facts, "textures") + ", " + count(facts, "lights") +
+                           "; " + human_bytes(facts["image_bytes"].get<double>()) + " of images");
+  out += line("world size", facts["world_size"].dump());
+  if (facts.contains("light")) out += light_lines(facts["light"]);
+  if (facts.contains("draco_bytes") && facts["draco_bytes"] != 0)
+    out += line("draco", human_bytes(facts["draco_bytes"].get<double>()));
+  if (facts.contains("bytes_per_vertex")) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f", facts["bytes_per_vertex"].get<double>());
+    out += line("per vertex", text + std::string(" bytes"));
+  }
+  for (const auto& [name, attribute] : facts.value("attributes", json::object()).items())
+    out += line("attribute", name + " " + attribute["type"].get<std::string>() + " x " + attribute["elements"].dump());
+  for (const json& w : facts["warnings"])
+    out += line("warning", w["where"].get<std::string>() + " " + w["message"].get<std::string>());
+  if (facts.contains("certificate"))
+    out += line("certificate", facts["certificate"].is_object()
+                                   ? certificate_text(json{{"certificate", facts["certificate"]}}.dump())
+                                   : "none beside this file");
+  return out;
+}
+
+}  // namespace
+
+Outcome<ExitCode> run(const InspectOptions& options, Session& session) {
+  KILN_TRY(facts, facts_of(options.file));
+  const auto replace = json::error_handler_t::replace;
+  const Outcome<void> written =
+      write_text("", session.common.json ? facts.dump(-1, ' ', false, replace) + "\n" : facts_text(facts));
+  if (!written) return tl::make_unexpected(written.error());
+  return ExitCode::ok;
+}
+
+}  // namespace kiln

@@ -1,0 +1,99 @@
+#include "client_cli/report_text.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "client_cli/terminal.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+json parsed(std::string_view text) {
+  json document = json::parse(text, nullptr, false);
+  return document.is_object() ? document : json::object();
+}
+
+double number_of(const json& object, const char* name) {
+  return object.contains(name) && object[name].is_number() ? object[name].get<double>() : 0.0;
+}
+
+std::string text_of(const json& object, const char* name) {
+  if (!object.is_object() || !object.contains(name)) return {};
+  return object[name].is_string() ? object[name].get<std::string>() : object[name].dump();
+}
+
+json list_of(const json& object, const char* name) {
+  return object.contains(name) && object[name].is_array() ? object[name] : json::array();
+}
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g %%", 100 * share);
+  return text;
+}
+
+std::string count(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f", number);
+  return text;
+}
+
+std::string error_text(const json& error) {
+  std::string out = "relRMSE " + percent(number_of(error, "relrmse"));
+  const json interval = list_of(error, "interval");
+  if (interval.size() == 2 && interval[0].is_number() && interval[1].is_number())
+    out += " (95 % interval " + percent(interval[0].get<double>()) + " .. " + percent(interval[1].get<double>()) + ")";
+  return out;
+}
+
+std::string prediction_text(const json& plan) {
+  if (!plan.contains("prediction")) return {};
+  const json& p = plan["prediction"];
+  return "predicted: " + human_seconds(number_of(p, "seconds")) + ", " + human_bytes(number_of(p, "memory_bytes")) +
+         " of memory, " + human_bytes(number_of(p, "artifact_bytes")) + " of result, " +
+         count(number_of(p, "triangles")) + " triangles\n";
+}
+
+}  // namespace
+
+std::string plan_text(std::string_view text) {
+  const json plan = parsed(text);
+  std::string out;
+  for (const json& decision : list_of(plan, "plan")) {
+    char line[128];
+    std::snprintf(line, sizeof line, "%-18s %-14s ", text_of(decision, "decision").c_str(),
+                  text_of(decision, "value").c_str());
+    out += line + text_of(decision, "reason") + "\n";
+  }
+  for (const json& warning : list_of(plan, "warnings")) {
+    const std::string where = text_of(warning, "where");
+    out += "warning: " + (where.empty() ? "" : where + ": ") + text_of(warning, "message") + " [" +
+           text_of(warning, "code") + "]\n";
+  }
+  return out + prediction_text(plan);
+}
+
+std::string certificate_text(std::string_view report) {
+  const json document = parsed(report);
+  if (!document.contains("certificate") || !document["certificate"].is_object()) return {};
+  const json& certificate = document["certificate"];
+  std::string out = error_text(certificate) + ", without worst 1 % " +
+                    percent(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
+                    percent(number_of(certificate, "p99")) + ", bias " + percent(number_of(certificate, "bias")) +
+                    ", at " + count(number_of(certificate, "points")) + " points";
+  if (certificate.contains("truncation") && certificate["truncation"].is_object())
+    out += "\ntruncation of the light: " + error_text(certificate["truncation"]);
+  return out;
+}
+
+std::optional<double> certified_error(std::string_view report) {
+  const json document = parsed(report);
+  if (!document.contains("certificate") || !document["certificate"].is_object()) return std::nullopt;
+  const json& certificate = document["certificate"];
+  if (!certificate.contains("relrmse") || !certificate["relrmse"].is_number()) return std::nullopt;
+  return certificate["relrmse"].get<double>();
+}
+
+}  // namespace kiln

@@ -1,0 +1,21 @@
+#pragma once
+// report.json and plans as text for people.
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "client_cli/failure.h"
+
+namespace kiln {
+
+/// The decisions of a plan with their reasons, predictions and warnings. Works for plans and reports.
+std::string plan_text(std::string_view json);
+
+/// "error 1.2 % (95 % interval 1.0 .. 1.5 %), ..." of a report's certificate; empty when it has none.
+std::string certificate_text(std::string_view report_json);
+
+/// relRMSE of a report's certificate; nothing when it has none.
+std::optional<double> certified_error(std::string_view report_json);
+
+}  // namespace kiln
