@@ -48,20 +48,36 @@ export function projectEquirect(map: EquirectMap, order: number): Float32Array {
   return Float32Array.from(sums);
 }
 
-/// SH light as a picture of `width` x `width / 2` texels, rows from the top, RGBA. Negative lobes are shown as black.
-export function lightToEquirect(order: number, light: ArrayLike<number>, width: number): EquirectMap {
+/// A function on the sphere as a picture of `width` x `width / 2` texels, rows from the top, RGBA.
+export function functionToEquirect(radiance: (x: number, y: number, z: number, rgb: Float64Array) => void, width: number): EquirectMap {
   const height = width / 2;
   const data = new Float32Array(4 * width * height);
-  const basis = new Float64Array(shCount(order));
   const rgb = new Float64Array(3);
   for (let texel = 0; texel < width * height; ++texel) {
     const { x, y, z } = directionAt(((texel % width) + 0.5) / width, (Math.floor(texel / width) + 0.5) / height);
-    evaluateSh(order, x, y, z, basis);
-    lightAlong(basis, light, rgb);
-    for (let c = 0; c < 3; ++c) data[4 * texel + c] = Math.max(0, rgb[c]);
+    radiance(x, y, z, rgb);
+    data.set(rgb, 4 * texel);
     data[4 * texel + 3] = 1;
   }
   return { width, height, stride: 4, data };
+}
+
+/// SH light as a picture. Where harmonics ring it is negative.
+export function lightToEquirect(order: number, light: ArrayLike<number>, width: number): EquirectMap {
+  const basis = new Float64Array(shCount(order));
+  const radiance = (x: number, y: number, z: number, rgb: Float64Array) => {
+    evaluateSh(order, x, y, z, basis);
+    lightAlong(basis, light, rgb);
+  };
+  return functionToEquirect(radiance, width);
+}
+
+/// The light blurred so that it does not ring: band l times sinc(pi l / order) (Lanczos's factors).
+export function softened(order: number, light: ArrayLike<number>): Float32Array {
+  return Float32Array.from({ length: 3 * shCount(order) }, (_, i) => {
+    const at = (Math.PI * Math.floor(Math.sqrt(Math.floor(i / 3)))) / order;
+    return light[i] * (at === 0 ? 1 : Math.sin(at) / at);
+  });
 }
 
 /// Halves a map until it is at most `width` wide: each 2 x 2 block becomes its mean, weighted by solid angle.

@@ -25,6 +25,12 @@ export interface RelightRequest {
   reuse: Float32Array[]; // arrays to write to, one per part; or none
 }
 
+/// How bright the model is under a light: the 90th percentile over the vertices of the brightest channel.
+export interface LevelRequest {
+  kind: 'level';
+  light: Float32Array;
+}
+
 export interface MeasureRequest {
   kind: 'measure';
   weighted: boolean;
@@ -44,11 +50,11 @@ export interface ProjectRequest {
   order: number;
 }
 
-export type Request = LoadRequest | RelightRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
+export type Request = LoadRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
 
 export interface ValuesReply {
   values: Float32Array[]; // one per part
-  range: number; // where a colour scale should end
+  range: number; // where a colour scale should end; of a level request the level
   milliseconds: number; // spent computing
 }
 

@@ -25,6 +25,10 @@ export class Relighter {
     return this.values({ kind: 'relight', light, lamps, reuse }, reuse);
   }
 
+  async level(light: Float32Array): Promise<number> {
+    return (await this.values({ kind: 'level', light })).range;
+  }
+
   measure(weighted: boolean): Promise<ValuesReply> {
     return this.values({ kind: 'measure', weighted });
   }

@@ -1,12 +1,13 @@
 // Built-in lights from formulas, each a function on the sphere plus directional suns, projected here to SH.
 // "overcast" and "clear" are those of core/scene/skies.cpp (CIE S 011 distributions, zenith luminance 1).
 
+import { functionToEquirect, type EquirectMap } from './equirect';
 import { evaluateSh, projectFunction, shCount } from './sh';
 
 type Rgb = readonly [number, number, number];
 
 /// A light too small to resolve: what it sends on a plane that faces it.
-interface Sun {
+export interface Sun {
   direction: Rgb;
   irradiance: Rgb;
 }
@@ -95,6 +96,15 @@ export const kSkies: readonly Sky[] = [
     suns: [{ direction: [0.4, 0.75, 0.53], irradiance: [6, 6, 6] }],
   },
 ];
+
+/// The sky as the eye would see it, each sun as a small glow of its own irradiance.
+export function skyPicture(sky: Sky, width: number): EquirectMap {
+  const sharpness = 900; // a glow of about 4 degrees, a few texels wide
+  return functionToEquirect((x, y, z, rgb) => {
+    sky.radiance(x, y, z, rgb);
+    for (const { direction, irradiance } of sky.suns) added(rgb, irradiance, (sharpness / (2 * Math.PI)) * lobe(x, y, z, direction, sharpness));
+  }, width);
+}
 
 /// SH coefficients of a sky, flat RGB. A sun counts as a point of its irradiance.
 export function projectSky(sky: Sky, order: number): Float32Array {

@@ -26,6 +26,15 @@ function load(request: LoadRequest): Float32Array[] {
   return [];
 }
 
+/// Lamps count: they are there whatever the sky.
+function level(light: Float32Array): number {
+  const brightest = parts.map((p) => {
+    const values = relight(shape, p.coefficients, light, true);
+    return Float32Array.from({ length: values.length / 3 }, (_, v) => Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]));
+  });
+  return rangeOf(brightest, 0.9);
+}
+
 function measure(weighted: boolean): Float32Array[] {
   return parts.map((p) => triangleMeasure(shape, p.coefficients, p.positions, p.indices, weighted));
 }
@@ -42,11 +51,11 @@ async function project(request: ProjectRequest): Promise<ProjectReply> {
 }
 
 /// Colour scales end at the 99th percentile of the magnitudes over all parts.
-function rangeOf(values: Float32Array[]): number {
+function rangeOf(values: Float32Array[], q = 0.99): number {
   const all = new Float32Array(values.reduce((sum, part) => sum + part.length, 0));
   let at = 0;
   for (const part of values) for (const value of part) all[at++] = Math.abs(value);
-  return quantile(all, 0.99);
+  return quantile(all, q);
 }
 
 function timed(compute: () => Float32Array[], ranged: boolean): ValuesReply {
@@ -62,6 +71,8 @@ function compute(request: Exclude<Request, ProjectRequest>): ValuesReply {
       return timed(() => load(request), false);
     case 'relight':
       return timed(() => parts.map((p, i) => relight(shape, p.coefficients, request.light, request.lamps, request.reuse[i])), false);
+    case 'level':
+      return { values: [], range: level(request.light), milliseconds: 0 };
     case 'measure':
       return timed(() => measure(request.weighted), true);
     case 'coefficient':

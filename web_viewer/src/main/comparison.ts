@@ -1,13 +1,15 @@
 // Before and after: left of the divider the original materials under the same light without shadows (three's image-based
 // light, what a viewer shows without a bake), right of it the baked model.
 
-import { type Light, type Mesh, type Object3D, type Material, Scene, type Texture } from 'three';
+import { Color, DirectionalLight, Group, type Light, type Mesh, type Object3D, type Material, Scene, type Texture } from 'three';
 import { disposeMaterials } from './baked_model';
+import type { Sun } from '../light/skies';
 import type { Stage } from './stage';
 import { SkyBackground } from '../shaders/sky_background';
 
 export interface ComparisonLight {
   reflection: Texture; // equirectangular, for scene.environment
+  suns: readonly Sun[];
   background: Texture | null;
   rotation: number;
   intensity: number;
@@ -18,23 +20,35 @@ export class Comparison {
   divider = 0.5;
   private readonly scene = new Scene();
   private readonly background = new SkyBackground();
+  private readonly suns = new Group();
 
   constructor(
     private readonly stage: Stage,
     private readonly original: Object3D,
   ) {
-    this.scene.add(original, this.background.mesh);
+    this.scene.add(original, this.background.mesh, this.suns);
     stage.drawWith = (width, height) => this.draw(width, height);
   }
 
-  setLight({ reflection, background, rotation, intensity, lamps }: ComparisonLight): void {
+  setLight({ reflection, suns, background, rotation, intensity, lamps }: ComparisonLight): void {
     this.scene.environment = reflection;
     this.scene.environmentRotation.y = (rotation * Math.PI) / 180;
     this.scene.environmentIntensity = intensity;
     this.background.show(background, rotation, intensity);
+    this.setSuns(suns, rotation, intensity);
     this.original.traverse((object) => {
       if ((object as Light).isLight) object.visible = lamps;
     });
+  }
+
+  private setSuns(suns: readonly Sun[], rotation: number, intensity: number): void {
+    this.suns.rotation.y = (rotation * Math.PI) / 180;
+    this.suns.clear();
+    for (const { direction, irradiance } of suns) {
+      const lamp = new DirectionalLight(new Color().setRGB(...irradiance), intensity);
+      lamp.position.set(...direction);
+      this.suns.add(lamp);
+    }
   }
 
   private draw(width: number, height: number): void {
@@ -52,6 +66,7 @@ export class Comparison {
     this.stage.drawWith = null;
     this.scene.environment = null;
     this.background.dispose();
+    this.suns.clear();
     const materials = new Set<Material>();
     this.original.traverse((object) => {
       const { geometry, material } = object as Mesh;

@@ -26,7 +26,7 @@ export function listenToKeys(stage: Stage, state: Store<ViewState>, canCompare: 
     const mode = kModes[Number(key) - 1];
     if (mode) state.set({ mode });
     else if (key === 'w') state.set({ wire: !now.wire });
-    else if (key === 'b') state.set({ background: now.background === 'off' ? 'light' : 'off' });
+    else if (key === 'b') state.set({ background: now.background === 'off' ? 'sky' : 'off' });
     else if (key === 'c' && canCompare) state.set({ compare: now.compare === null ? 0.5 : null });
     else if (key === '[' || key === ']') state.set({ rotation: turned(now.rotation, key === ']' ? 5 : -5) });
     else if (key === '+' || key === '=' || key === '-') state.set({ ev: Math.min(6, Math.max(-6, now.ev + (key === '-' ? -0.5 : 0.5))) });
@@ -58,7 +58,7 @@ export function resetView(stage: Stage, state: Store<ViewState>): void {
 }
 
 function ownsKeys(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.closest('input:not([type=checkbox]), select, textarea, dialog, [role=slider]') !== null;
+  return target instanceof HTMLElement && target.closest('input:not([type=checkbox]), select, textarea, dialog[open], [role=slider]') !== null;
 }
 
 function moveCamera(stage: Stage, event: KeyboardEvent): boolean {

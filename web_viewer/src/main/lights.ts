@@ -1,7 +1,7 @@
 // The lights a viewer can choose from, as SH coefficients of one order, before rotation and intensity.
 
-import { lightToEquirect, type EquirectMap } from '../light/equirect';
-import { kSkies, projectSky } from '../light/skies';
+import { functionToEquirect, lightToEquirect, softened, type EquirectMap } from '../light/equirect';
+import { kSkies, projectSky, skyPicture, type Sun } from '../light/skies';
 import { rotateAboutY, withOrder } from '../light/sh';
 
 export interface LightChoice {
@@ -9,10 +9,13 @@ export interface LightChoice {
   label: string;
 }
 
-const kShownWidth = 128; // SH of order 10 resolve 20 degrees; 128 texels are 2.8 degrees apart
+const kHarmonicsWidth = 128; // SH of order 10 resolve 20 degrees; 128 texels are 2.8 degrees apart
+const kSkyWidth = 512;
 
 export class Lights {
   private readonly known = new Map<string, Float32Array>();
+  /// Brightness of the model under each light, unturned, at intensity 1; filled by the viewer.
+  readonly levels = new Map<string, number>();
   private map: EquirectMap | null = null;
   readonly choices: LightChoice[] = [];
 
@@ -29,6 +32,7 @@ export class Lights {
 
   addFile(name: string, light: Float32Array, map: EquirectMap): void {
     this.known.set('file', light);
+    this.levels.delete('file');
     this.map = map;
     const place = this.choices.findIndex(({ id }) => id === 'file');
     this.choices.splice(place < 0 ? this.choices.length : place, place < 0 ? 0 : 1, { id: 'file', label: `Dropped: ${name}` });
@@ -51,8 +55,19 @@ export class Lights {
     return light;
   }
 
-  /// A picture of it: of the coefficients, or of the dropped map itself.
-  picture(id: string, ofMap: boolean): EquirectMap {
-    return ofMap && id === 'file' && this.map ? this.map : lightToEquirect(this.order, this.coefficients(id), kShownWidth);
+  /// What three's image-based light gets: no suns (its filter loses small bright spots; they come as lamps) and no detail.
+  reflection(id: string): { picture: EquirectMap; suns: readonly Sun[] } {
+    const sky = kSkies.find((one) => one.id === id);
+    if (sky) return { picture: functionToEquirect(sky.radiance, kSkyWidth), suns: sky.suns };
+    return { picture: lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth), suns: [] };
+  }
+
+  /// A picture of the light: its harmonics as they are, or the sky itself. Of the baked light only harmonics are known;
+  /// they are softened then.
+  picture(id: string, harmonics: boolean): EquirectMap {
+    if (harmonics) return lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth);
+    if (id === 'file' && this.map) return this.map;
+    const sky = kSkies.find((one) => one.id === id);
+    return sky ? skyPicture(sky, kSkyWidth) : lightToEquirect(this.order, softened(this.order, this.coefficients(id)), kHarmonicsWidth);
   }
 }

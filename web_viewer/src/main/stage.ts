@@ -36,6 +36,7 @@ export class Stage {
   drawWith: ((width: number, height: number) => void) | null = null;
   onDrawn: (() => void) | null = null;
   onMoved: (() => void) | null = null;
+  private readonly box = new Box3();
   private readonly bounds = new Sphere(new Vector3(), 1);
   private readonly resizes: ResizeObserver;
   private frame = 0;
@@ -76,6 +77,7 @@ export class Stage {
 
   /// The model's place and size: framing, near and far planes follow from it.
   setBounds(box: Box3): void {
+    this.box.copy(box);
     if (!box.isEmpty()) box.getBoundingSphere(this.bounds);
     if (!(this.bounds.radius > 0)) this.bounds.radius = 1;
     this.controls.minDistance = 0.02 * this.bounds.radius;
@@ -103,16 +105,27 @@ export class Stage {
     const { center, radius } = this.bounds;
     const direction = this.camera.position.clone().sub(this.controls.target).normalize();
     this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(direction, this.framingDistance() * radius);
+    this.camera.position.copy(center).addScaledVector(direction, radius);
+    this.camera.lookAt(center);
+    this.camera.position.copy(center).addScaledVector(direction, this.framingDistance());
     this.fitPlanes();
     this.controls.update();
     this.requestDraw();
   }
 
+  /// How far from the centre the camera must stand to see every corner of the box, with a margin.
   private framingDistance(): number {
-    const vertical = (this.camera.fov * Math.PI) / 360;
-    const narrow = Math.min(vertical, Math.atan(Math.tan(vertical) * this.camera.aspect));
-    return 1.02 / Math.sin(narrow);
+    const margin = 1.12;
+    const up = Math.tan((this.camera.fov * Math.PI) / 360) / margin;
+    const side = up * this.camera.aspect;
+    const turn = this.camera.quaternion.clone().invert();
+    let distance = 0.1 * this.bounds.radius;
+    for (let corner = 0; corner < 8; ++corner) {
+      const pick = (bit: number, axis: 'x' | 'y' | 'z') => (corner & bit ? this.box.max[axis] : this.box.min[axis]);
+      const seen = new Vector3(pick(1, 'x'), pick(2, 'y'), pick(4, 'z')).sub(this.bounds.center).applyQuaternion(turn);
+      distance = Math.max(distance, seen.z + Math.max(Math.abs(seen.x) / side, Math.abs(seen.y) / up));
+    }
+    return distance;
   }
 
   private fitPlanes(): void {
@@ -139,5 +152,6 @@ export class Stage {
     this.canvas.removeEventListener('webglcontextrestored', this.requestDraw);
     this.controls.dispose();
     this.renderer.dispose();
+    this.renderer.forceContextLoss(); // the GPU's memory now, not when the garbage collector comes by
   }
 }

@@ -2,6 +2,7 @@
 
 import { artifact, artifactUrl, explain, finished, follow, getJob, getReport, type Job, type Report } from '../asset/jobs';
 import { loadGltf } from '../asset/load_gltf';
+import { Relighter } from '../light/relighter';
 import { kSkies } from '../light/skies';
 import { announce, copyText, h, replaceChildren, toast } from '../ui/dom';
 import { bytes } from '../ui/format';
@@ -144,14 +145,16 @@ function acceptEnvironments(panel: ViewPanel): void {
 async function show(job: Job): Promise<void> {
   const file = artifact(job, 'scene.glb');
   if (job.status !== 'succeeded' || !file) throw new Error(job.error ? explain(job.error) : `The job is ${job.status}; there is nothing to show.`);
-  const stage = createStage();
-  undo.push(() => stage.dispose());
   const loaded = (done: number, total: number) =>
     showOverlay(total ? `Loading ${bytes(done)} of ${bytes(total)}` : `Loading ${bytes(done)}`, total ? done / total : null);
   const report: Promise<Report | null> = artifact(job, 'report.json') ? getReport(job).catch(() => null) : Promise.resolve(null);
-  const asset = await loadGltf(artifactUrl(job, 'scene.glb'), loaded, new AbortController().signal);
+  const loading = loadGltf(artifactUrl(job, 'scene.glb'), loaded, new AbortController().signal);
+  const relighter = new Relighter();
+  const stage = createStage(); // takes its time: file and worker are on their way meanwhile
+  undo.push(() => stage.dispose());
+  const asset = await loading;
   const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
-  const viewer = await Viewer.open(stage, asset, state);
+  const viewer = await Viewer.open(stage, asset, state, relighter);
   undo.push(() => viewer.dispose());
   overlay.hidden = true;
   performance.mark('kiln:first-picture');

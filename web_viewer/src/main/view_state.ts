@@ -5,7 +5,7 @@ import type { CameraPose } from './stage';
 
 export type ToneMap = 'neutral' | 'aces' | 'none';
 export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient';
-export type Background = 'off' | 'light' | 'map';
+export type Background = 'off' | 'sky' | 'harmonics';
 
 export interface ViewState {
   light: string; // 'baked', the id of a sky, or 'file' for a dropped map
@@ -30,7 +30,7 @@ export const kDefaultState: ViewState = {
   lamps: true,
   ev: 0,
   tone: 'neutral',
-  background: 'light',
+  background: 'sky',
   wire: false,
   mode: 'shaded',
   channel: 0,
@@ -70,7 +70,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     lamps: flag('lamps'),
     ev: number('ev', -8, 8),
     tone: one<ToneMap>('tone', ['neutral', 'aces', 'none']),
-    background: one<Background>('background', ['off', 'light', 'map']),
+    background: one<Background>('background', ['off', 'sky', 'harmonics']),
     wire: flag('wire'),
     mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient']),
     channel: Math.round(number('channel', 0, 2)),

@@ -1,7 +1,7 @@
 // The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
 
 import type { LoadedAsset } from '../asset/load_gltf';
-import { Relighter } from '../light/relighter';
+import type { Relighter } from '../light/relighter';
 import { SkyBackground } from '../shaders/sky_background';
 import { skyTexture } from '../shaders/sky_texture';
 import type { Texture } from 'three';
@@ -23,7 +23,6 @@ export class Viewer {
   onFailure: (message: string) => void = () => {};
   /// Called when the list of lights has grown.
   onLights: () => void = () => {};
-  private readonly relighter = new Relighter();
   private readonly background = new SkyBackground();
   private readonly unsubscribe: () => void;
   /// What the worker needed for the light that is shown.
@@ -44,6 +43,7 @@ export class Viewer {
     readonly asset: LoadedAsset,
     readonly model: BakedModel,
     readonly state: Store<ViewState>,
+    private readonly relighter: Relighter,
   ) {
     const { transfer } = model;
     this.lights = new Lights(transfer.order, transfer.bakedLight, transfer.light?.name ?? '');
@@ -53,13 +53,14 @@ export class Viewer {
     this.unsubscribe = state.subscribe((_state, changed) => this.apply(changed));
   }
 
-  /// Resolves when the first light is on the screen.
-  static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>): Promise<Viewer> {
+  /// Resolves when the first light is on the screen. The viewer owns asset and relighter from then on.
+  static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>, relighter: Relighter): Promise<Viewer> {
     const model = await BakedModel.create(asset);
-    const viewer = new Viewer(stage, asset, model, state);
+    const viewer = new Viewer(stage, asset, model, state, relighter);
     const { order, channels, fixed, slots, scale, offset } = model.transfer;
-    await viewer.relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
+    await relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
     await viewer.relightOnce();
+    await viewer.measureLevel();
     viewer.apply(new Set<keyof ViewState>(['ev', 'tone', 'background', 'wire', 'mode', 'compare']));
     stage.drawNow();
     return viewer;
@@ -75,7 +76,8 @@ export class Viewer {
     const has = (...keys: (keyof ViewState)[]) => keys.some((key) => changed.has(key));
     const state = this.state.get();
     if (has('light', 'rotation', 'intensity', 'lamps')) void this.relight();
-    if (has('ev', 'tone')) this.stage.setLook((this.model.transfer.look?.exposure ?? 1) * 2 ** state.ev, state.tone);
+    if (has('light')) void this.measureLevel();
+    if (has('ev', 'tone')) this.setLook();
     if (has('mode', 'channel', 'slot')) void this.showMode(state);
     if (has('wire')) this.showWire(state.wire);
     if (has('compare')) void this.compare(state.compare);
@@ -95,6 +97,27 @@ export class Viewer {
     }
     this.relighting = false;
     if (this.relightAgain) await this.relight();
+  }
+
+  /// The bake chose an exposure for its own light. Under another one the picture is exposed so that the model comes out as
+  /// bright; intensity and exposure still do what they say.
+  private async measureLevel(): Promise<void> {
+    const { light } = this.state.get();
+    try {
+      for (const id of light === 'baked' ? [] : ['baked', light]) {
+        if (!this.lights.levels.has(id)) this.lights.levels.set(id, await this.relighter.level(this.lights.coefficients(id)));
+      }
+      this.setLook();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  private setLook(): void {
+    const { light, ev, tone } = this.state.get();
+    const [baked, now] = [this.lights.levels.get('baked') ?? 0, this.lights.levels.get(light) ?? 0];
+    const ratio = light !== 'baked' && baked > 0 && now > 0 ? baked / now : 1;
+    this.stage.setLook((this.model.transfer.look?.exposure ?? 1) * ratio * 2 ** ev, tone);
   }
 
   private async relightOnce(): Promise<void> {
@@ -164,20 +187,21 @@ export class Viewer {
 
   private showSky(): void {
     const { light, background, rotation, intensity, lamps } = this.state.get();
-    const pictures = background === 'off' && !this.comparison ? null : this.picturesOf(light, background === 'map');
+    const pictures = background === 'off' && !this.comparison ? null : this.picturesOf(light, background === 'harmonics');
     const shown = background === 'off' ? null : (pictures?.background ?? null);
     this.background.show(shown, rotation, intensity);
     if (this.comparison && pictures) {
-      pictures.reflection ??= skyTexture(this.lights.picture(light, true), true);
-      this.comparison.setLight({ reflection: pictures.reflection, background: shown, rotation, intensity, lamps });
+      const { picture, suns } = this.lights.reflection(light);
+      pictures.reflection ??= skyTexture(picture, true);
+      this.comparison.setLight({ reflection: pictures.reflection, suns, background: shown, rotation, intensity, lamps });
     }
   }
 
-  private picturesOf(light: string, ofMap: boolean): { background: Texture; reflection: Texture | null } {
-    const key = `${light} ${ofMap}`;
+  private picturesOf(light: string, harmonics: boolean): { background: Texture; reflection: Texture | null } {
+    const key = `${light} ${harmonics}`;
     if (this.pictures?.key !== key) {
       this.dropPictures();
-      this.pictures = { key, background: skyTexture(this.lights.picture(light, ofMap), false), reflection: null };
+      this.pictures = { key, background: skyTexture(this.lights.picture(light, harmonics), false), reflection: null };
     }
     return this.pictures!;
   }

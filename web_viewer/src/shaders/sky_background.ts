@@ -22,7 +22,7 @@ void main() {
   float c = cos(rotation), s = sin(rotation);
   vec3 d = vec3(c * w.x - s * w.z, w.y, s * w.x + c * w.z);
   vec2 uv = vec2(0.5 + atan(d.z, d.x) / 6.283185307179586, 0.5 - asin(clamp(d.y, -1.0, 1.0)) / 3.141592653589793);
-  gl_FragColor = vec4(intensity * textureLod(sky, uv, 0.0).rgb, 1.0);
+  gl_FragColor = vec4(max(vec3(0.0), intensity * textureLod(sky, uv, 0.0).rgb), 1.0);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;

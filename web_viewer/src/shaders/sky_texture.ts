@@ -19,13 +19,14 @@ const kLargestHalf = 65504;
 /// turns the rows round.
 export function skyTexture(map: EquirectMap, forReflection: boolean): DataTexture {
   const texels = map.width * map.height;
+  const least = forReflection ? 0 : -kLargestHalf; // a background is cut off at zero after interpolation
   const data = new Uint16Array(4 * texels);
   for (let row = 0; row < map.height; ++row) {
     const source = forReflection ? map.height - 1 - row : row;
     for (let column = 0; column < map.width; ++column) {
       const from = map.stride * (source * map.width + column);
       const to = 4 * (row * map.width + column);
-      for (let c = 0; c < 3; ++c) data[to + c] = DataUtils.toHalfFloat(Math.min(map.data[from + c], kLargestHalf));
+      for (let c = 0; c < 3; ++c) data[to + c] = DataUtils.toHalfFloat(Math.min(Math.max(map.data[from + c], least), kLargestHalf));
       data[to + 3] = DataUtils.toHalfFloat(1);
     }
   }

@@ -44,6 +44,14 @@ export class Controls {
     return { element: h('div', { class: 'field' }, h('label', { for: input.id }, label), input), refill };
   }
 
+  /// A number chosen by name; the first name stands for 0.
+  numbered(key: Keys<number>, label: string, names: readonly string[]): HTMLElement {
+    const input = h('select', { id: `c-${key}` }, ...names.map((name, value) => h('option', { value }, name)));
+    input.addEventListener('change', () => this.state.set({ [key]: Number(input.value) }));
+    this.bind(key, (value) => (input.value = String(value)));
+    return h('div', { class: 'field inline' }, h('label', { for: input.id }, label), input);
+  }
+
   number(key: Keys<number>, label: string, min: number, max: number): HTMLElement {
     const input = h('input', { type: 'number', id: `c-${key}`, min, max, step: 1 });
     input.addEventListener('input', () => {

@@ -90,7 +90,7 @@ export class JobCard {
     const url = artifact(job, 'preview.png') ? artifactUrl(job, 'preview.png') : null;
     const image = url
       ? h('img', { src: url, alt: `Preview of ${name}`, loading: 'lazy', decoding: 'async' })
-      : h('span', { class: 'thumb-empty' }, finished(job) ? 'No picture' : 'Not baked yet');
+      : h('span', { class: 'thumb-empty' }, finished(job) ? 'No picture' : job.status === 'running' ? 'Baking' : 'Waiting');
     replaceChildren(this.picture, image);
     const viewable = job.status === 'succeeded';
     if (viewable) this.picture.href = `/view/${encodeURIComponent(job.id)}`;

@@ -16,7 +16,7 @@ export class LegendBox {
     if (!legend) return;
     paintScale(this.canvas, legend.map);
     this.title.textContent = title;
-    this.low.textContent = legend.range[0].toPrecision(3);
+    this.low.textContent = legend.range[0] === 0 ? '0' : `${legend.range[0].toPrecision(3)} and below`;
     this.high.textContent = `${legend.range[1].toPrecision(3)} and above`;
   }
 }

@@ -58,8 +58,8 @@ export class ViewPanel {
       { id: 'none', label: 'None, clamped' },
     ];
     const backgrounds = [
-      { id: 'light', label: 'The light, as harmonics' },
-      { id: 'map', label: 'The dropped map' },
+      { id: 'sky', label: 'Sky' },
+      { id: 'harmonics', label: 'The harmonics of the light' },
       { id: 'off', label: 'Plain' },
     ];
     return [
@@ -80,7 +80,7 @@ export class ViewPanel {
     ];
     const { channels, slots } = viewer.model.transfer;
     const slot = h('div', { class: 'sub' }, controls.number('slot', 'Coefficient', 0, slots - 1), slotName(viewer, controls));
-    if (channels === 3) slot.prepend(controls.number('channel', 'Channel (0 red)', 0, 2));
+    if (channels === 3) slot.prepend(controls.numbered('channel', 'Channel', ['red', 'green', 'blue']));
     controls.bind('mode', (mode) => (slot.hidden = mode !== 'coefficient'));
     return [controls.select('mode', 'Surface', () => modes).element, slot, controls.checkbox('wire', 'Wireframe'), compareSwitch(viewer, controls)];
   }

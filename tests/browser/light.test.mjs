@@ -1,0 +1,161 @@
+// The viewer's arithmetic, without a browser.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { load } from './sources.mjs';
+
+const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCount } = await load('light/sh.ts');
+const { sphereQuadrature } = await load('light/quadrature.ts');
+const { directionAt, projectEquirect, shrinkEquirect } = await load('light/equirect.ts');
+const { decodeAttributes, relight, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
+const { kSkies, projectSky } = await load('light/skies.ts');
+const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
+const { edgesOf } = await load('main/wireframe.ts');
+
+const near = (actual, expected, tolerance, what) => assert.ok(Math.abs(actual - expected) <= tolerance, `${what ?? ''} ${actual} is not ${expected} within ${tolerance}`);
+const kFloat = 1e-6; // results are float32; sums of a few hundred terms near 1
+const shAt = (order, x, y, z) => {
+  const out = new Float64Array(order * order);
+  evaluateSh(order, x, y, z, out);
+  return out;
+};
+const unit = (x, y, z) => [x, y, z].map((v) => v / Math.hypot(x, y, z));
+
+test('the first four harmonics have the constants and signs of core/sphere/sh.h', () => {
+  const [x, y, z] = unit(0.3, -0.8, 0.52);
+  const sh = shAt(2, x, y, z);
+  [0.2820947918, 0.4886025119 * y, 0.4886025119 * z, 0.4886025119 * x].forEach((value, i) => near(sh[i], value, 1e-9));
+});
+
+test('second-band harmonics are xy, yz, 3z^2-1, xz, x^2-y^2 without Condon-Shortley signs', () => {
+  const [x, y, z] = unit(0.5, 0.7, -0.2);
+  const a = Math.sqrt(15 / Math.PI) / 2;
+  const expected = [a * x * y, a * y * z, (Math.sqrt(5 / Math.PI) / 4) * (3 * z * z - 1), a * x * z, (a / 2) * (x * x - y * y)];
+  const sh = shAt(3, x, y, z);
+  expected.forEach((value, i) => near(sh[4 + i], value, 1e-12));
+});
+
+test('harmonics of order 10 are orthonormal', () => {
+  const sums = new Float64Array(100 * 100);
+  for (const { x, y, z, weight } of sphereQuadrature(10)) {
+    const sh = shAt(10, x, y, z);
+    for (let i = 0; i < 100; ++i) for (let j = 0; j < 100; ++j) sums[100 * i + j] += weight * sh[i] * sh[j];
+  }
+  // The quadrature is exact for degree 19; what is left is rounding of some 200 terms.
+  sums.forEach((value, k) => near(value, Math.floor(k / 100) === k % 100 ? 1 : 0, 1e-12));
+});
+
+test('an unoccluded plane under a constant map of radiance 1 has value exactly 1', () => {
+  const light = projectEquirect({ width: 8, height: 4, stride: 3, data: new Float32Array(8 * 4 * 3).fill(1) }, 6);
+  const transfer = clampedCosineTransfer(6, ...unit(0.2, 0.9, -0.3));
+  const coefficients = transfer;
+  const value = relight({ order: 6, channels: 1, fixed: false, slots: 36 }, coefficients, light, true);
+  // Midpoint samples of a 512 x 256 grid: the odd bands vanish, band 2 is off by its step squared, 4e-5 of 1 at most.
+  for (const v of value) near(v, 1, 5e-5);
+});
+
+test('a constant sky by formula gives exactly sqrt(4 pi) in band 0 and nothing else', () => {
+  const light = projectSky(kSkies.find(({ id }) => id === 'constant'), 5);
+  for (let i = 0; i < light.length; ++i) near(light[i], i < 3 ? Math.sqrt(4 * Math.PI) : 0, kFloat);
+});
+
+for (const [axis, index, direction] of [['x', 3, [1, 0, 0]], ['y', 1, [0, 1, 0]], ['z', 2, [0, 0, 1]]]) {
+  test(`light from +${axis} has a positive coefficient ${index}, and lights planes that face it`, () => {
+    const [u, v] = [0.5 + Math.atan2(direction[2], direction[0]) / (2 * Math.PI), 0.5 - Math.asin(direction[1]) / Math.PI];
+    const back = directionAt(u, v);
+    near(back.x * direction[0] + back.y * direction[1] + back.z * direction[2], 1, 1e-12);
+    const [width, height] = [64, 32];
+    const data = new Float32Array(3 * width * height);
+    for (let texel = 0; texel < width * height; ++texel) {
+      const d = directionAt(((texel % width) + 0.5) / width, (Math.floor(texel / width) + 0.5) / height);
+      if (d.x * direction[0] + d.y * direction[1] + d.z * direction[2] > 0.9) data.fill(10, 3 * texel, 3 * texel + 3);
+    }
+    const light = projectEquirect({ width, height, stride: 3, data }, 4);
+    assert.ok(light[3 * index] > 0.5, `coefficient ${index} is ${light[3 * index]}`);
+    for (const other of [1, 2, 3].filter((i) => i !== index)) near(light[3 * other], 0, 0.02 * light[3 * index]); // texel steps
+    const facing = relight({ order: 4, channels: 1, fixed: false, slots: 16 }, clampedCosineTransfer(4, ...direction), light, true)[0];
+    const averted = relight({ order: 4, channels: 1, fixed: false, slots: 16 }, clampedCosineTransfer(4, ...direction.map((d) => -d)), light, true)[0];
+    assert.ok(facing > 10 * Math.abs(averted), `${facing} against ${averted}`);
+  });
+}
+
+test('turning the light by 90 degrees takes +Z to +X', () => {
+  const lobe = (dx, dy, dz) => projectFunction(6, (x, y, z, rgb) => rgb.fill(Math.exp(3 * (x * dx + y * dy + z * dz))));
+  const turned = rotateAboutY(6, lobe(0, 0, 1), 90);
+  lobe(1, 0, 0).forEach((value, i) => near(turned[i], value, 2e-5 * 20, `coefficient ${i}`)); // float32 of values up to 20
+});
+
+test('turning by any angle keeps each band’s power, and full circles change nothing', () => {
+  const light = projectSky(kSkies.find(({ id }) => id === 'studio'), 7);
+  const power = (l, of) => of.slice(3 * l * l, 3 * (l + 1) ** 2).reduce((sum, v) => sum + v * v, 0);
+  const turned = rotateAboutY(7, light, 73);
+  for (let l = 0; l < 7; ++l) near(power(l, turned), power(l, light), 1e-5 * (1 + power(l, light)));
+  rotateAboutY(7, light, 360).forEach((value, i) => near(value, light[i], 1e-5));
+});
+
+test('halving a map keeps its integral', () => {
+  const [width, height] = [32, 16];
+  const data = Float32Array.from({ length: 3 * width * height }, (_, i) => ((i * 7919) % 101) / 100);
+  const map = { width, height, stride: 3, data };
+  const [fine, coarse] = [projectEquirect(map, 1), projectEquirect(shrinkEquirect(map, 8), 1)];
+  fine.forEach((value, i) => near(coarse[i], value, 1e-5 * value));
+});
+
+test('attributes decode to offset + scale * stored, four flat slots each, zero padding ignored', () => {
+  const shape = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
+  const attributes = [Float32Array.of(0.1, 0.2, 0.3, 0.4, -0.1, -0.2, -0.3, -0.4), Float32Array.of(0.5, 0.6, 9, 9, -0.5, -0.6, 9, 9)];
+  const [scale, offset] = [[1, 2, 3, 4, 5, 6], [10, 20, 30, 40, 50, 60]];
+  const out = decodeAttributes(shape, attributes, scale, offset);
+  const stored = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+  for (let v = 0; v < 2; ++v) stored.forEach((s, slot) => near(out[6 * v + slot], offset[slot] + scale[slot] * (v === 0 ? s : -s), 1e-5));
+});
+
+test('grey transfer lights each channel by its own light; lamps can be put out', () => {
+  const shape = { order: 1, channels: 1, fixed: true, slots: 2 };
+  const coefficients = Float32Array.of(2, 0.25); // one SH slot, one lamp slot
+  const light = Float32Array.of(1, 10, 100);
+  assert.deepEqual([...relight(shape, coefficients, light, true)], [2.25, 20.25, 200.25]);
+  assert.deepEqual([...relight(shape, coefficients, light, false)], [2, 20, 200]);
+});
+
+test('RGB transfer takes each channel’s own slots', () => {
+  const shape = { order: 1, channels: 3, fixed: true, slots: 2 };
+  const coefficients = Float32Array.of(1, 0.5, 2, 0.25, 3, 0.125);
+  assert.deepEqual([...relight(shape, coefficients, Float32Array.of(1, 10, 100), true)], [1.5, 20.25, 300.125]);
+  assert.deepEqual([...pickCoefficient(shape, coefficients, 2, 0)], [3]);
+});
+
+test('the measure of a triangle is the sum of its edges’ transfer distances; lamps do not count', () => {
+  const shape = { order: 1, channels: 1, fixed: true, slots: 2 };
+  const coefficients = Float32Array.of(0, 50, 3, -50, 7, 0);
+  const positions = Float32Array.of(0, 0, 0, 2, 0, 0, 0, 4, 0); // area 4
+  assert.deepEqual([...triangleMeasure(shape, coefficients, positions, [0, 1, 2], false)], [3 + 4 + 7]);
+  assert.deepEqual([...triangleMeasure(shape, coefficients, positions, [0, 1, 2], true)], [2 * 14]);
+});
+
+test('a quantile bounds its share of the values', () => {
+  assert.equal(quantile(Float32Array.from({ length: 100 }, (_, i) => i), 0.99), 99);
+  assert.equal(quantile(new Float32Array(0), 0.5), 0);
+});
+
+test('each edge of a quad is drawn once', () => {
+  const edges = edgesOf([0, 1, 2, 2, 1, 3]);
+  assert.equal(edges.length / 2, 5);
+});
+
+test('the state survives the address, and defaults leave it empty', () => {
+  const state = { ...kDefaultState, light: 'clear', rotation: -42, ev: 1.5, wire: true, mode: 'coefficient', slot: 7, compare: 0.25, pose: [1, 2, 3.5, 0, -0.25, 0] };
+  assert.deepEqual(decodeState(encodeState(state), ['baked', 'clear']), state);
+  assert.equal(encodeState(kDefaultState), '');
+});
+
+test('an address of nonsense gives the defaults', () => {
+  assert.deepEqual(decodeState('light=<script>&ev=NaN&mode=7&pose=1,2&rotation=Infinity&compare=&slot=-3', ['baked']), { ...kDefaultState, compare: 0, slot: 0 });
+});
+
+test('numbers outside their range are moved to its end', () => {
+  const state = decodeState('ev=99&rotation=-1000&compare=7', ['baked']);
+  assert.deepEqual([state.ev, state.rotation, state.compare], [8, -180, 1]);
+});
+
+test('a hundred coefficients exist at order 10', () => assert.equal(shCount(10), 100));
