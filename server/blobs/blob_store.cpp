@@ -52,6 +52,16 @@ Result<void> sync_folder(FileLayer& files, const fs::path& folder) {
   return {};
 }
 
+Result<void> make_folder(FileLayer& files, const fs::path& folder) {
+  if (files.mkdir(folder, 0700) == 0 || errno == EEXIST) return {};
+  return io_fault(errno, "make a folder of its store");
+}
+
+std::string shelf_name(int shelf) {
+  constexpr const char* kHex = "0123456789abcdef";
+  return {kHex[shelf / 16], kHex[shelf % 16]};
+}
+
 /// Feeds the file to `take` piece by piece.
 Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::span<const std::uint8_t>)>& take) {
   std::vector<std::uint8_t> piece(kPiece);
@@ -172,10 +182,17 @@ BlobStore::~BlobStore() = default;
 
 Result<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& root, FileLayer& files) {
   for (const char* folder : {"", "cas", "tmp"}) {
-    const fs::path path = root / folder;
-    if (files.mkdir(path, 0700) != 0 && errno != EEXIST) return io_fault(errno, "make a folder of its store");
+    if (auto made = make_folder(files, root / folder); !made) return tl::make_unexpected(made.error());
   }
-  if (auto synced = sync_folder(files, root); !synced) return tl::make_unexpected(synced.error());
+  // All 256 shelves now: a folder made later would have to be synced by everyone who finds it.
+  for (int shelf = 0; shelf < 256; ++shelf) {
+    if (auto made = make_folder(files, root / "cas" / shelf_name(shelf)); !made) {
+      return tl::make_unexpected(made.error());
+    }
+  }
+  for (const fs::path& folder : {root / "cas", root}) {
+    if (auto synced = sync_folder(files, folder); !synced) return tl::make_unexpected(synced.error());
+  }
   return std::unique_ptr<BlobStore>(new BlobStore(root, files));
 }
 
@@ -183,7 +200,7 @@ fs::path BlobStore::path_of(const std::string& sha256) const { return root_ / "c
 
 Result<BlobWriter> BlobStore::write() {
   fs::path tmp = root_ / "tmp" / ("new." + random_name());
-  const int fd = files_->open(tmp, O_WRONLY | O_CREAT | O_EXCL, 0600);
+  const int fd = retry_interrupted([&] { return files_->open(tmp, O_WRONLY | O_CREAT | O_EXCL, 0600); });
   if (fd < 0) return io_fault(errno, "begin a blob");
   return BlobWriter(*this, std::move(tmp), fd, "");
 }
@@ -230,19 +247,14 @@ void BlobStore::release_name(const std::string& sha256) {
 
 Result<StoredBlob> BlobStore::publish(const fs::path& tmp, const std::string& sha256, std::uint64_t bytes) {
   const fs::path target = path_of(sha256);
-  const bool new_folder = files_->mkdir(target.parent_path(), 0700) == 0;
-  if (!new_folder && errno != EEXIST) return io_fault(errno, "make a folder of its store");
   const bool existed = exists(sha256);
   if (files_->rename(tmp, target) != 0) return io_fault(errno, "name a blob");
   if (auto synced = sync_folder(*files_, target.parent_path()); !synced) return tl::make_unexpected(synced.error());
-  if (new_folder) {
-    if (auto synced = sync_folder(*files_, root_ / "cas"); !synced) return tl::make_unexpected(synced.error());
-  }
   return StoredBlob{sha256, bytes, existed};
 }
 
 Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
-  const int fd = files_->open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  const int fd = retry_interrupted([&] { return files_->open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK); });
   if (fd < 0 && (errno == ENOENT || errno == ELOOP)) return fault("not_found", "there is no such result");
   if (fd < 0) return io_fault(errno, "open a result");
   struct stat status {};

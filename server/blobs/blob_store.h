@@ -1,6 +1,6 @@
 #pragma once
 // Content-addressed files: <root>/cas/ab/<sha256>. A blob is whole or not there, whenever the machine stops:
-//   write <root>/tmp/x (O_EXCL, hashed on the way) -> fsync -> rename to cas/ab/<sha256> -> fsync cas/ab (and cas).
+//   write <root>/tmp/x (O_EXCL, hashed on the way) -> fsync -> rename to cas/ab/<sha256> -> fsync cas/ab.
 // A failed fsync means the file is lost: it is deleted, never synced again.
 // Fault codes: disk_full (507), io_failed, not_found, hash_mismatch, upload_busy, offset_mismatch.
 

@@ -1,0 +1,123 @@
+// Every system call of a commit as the last one, and as one that fails.
+
+#include <fstream>
+
+#include "tests/server/blobs/blob_fixture.h"
+#include "tests/server/blobs/faulty_files.h"
+
+namespace kiln::testing {
+namespace {
+
+const std::string kText = "bytes that must be whole or not there";
+
+enum class Way { upload, adoption };
+
+class BlobCrash : public BlobTest, public ::testing::WithParamInterface<Way> {
+ protected:
+  /// Puts kText in the way under test.
+  Result<StoredBlob> put(BlobStore& store) const {
+    if (GetParam() == Way::adoption) {
+      std::ofstream(folder_ / "result") << kText;
+      return store.adopt(folder_ / "result");
+    }
+    auto writer = store.write();
+    if (!writer) return tl::make_unexpected(writer.error());
+    for (const std::string& half : {kText.substr(0, 9), kText.substr(9)}) {
+      if (auto written = writer->write(bytes_of(half)); !written) return tl::make_unexpected(written.error());
+    }
+    return writer->finish();
+  }
+
+  void clear() {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directory(folder_);
+  }
+
+  /// After any end: what is there is sound, nothing half is left, and trying again works.
+  void expect_recovers(bool acknowledged) {
+    FaultyFiles healthy;
+    const auto store = BlobStore::open(folder_, healthy).value();
+    store->remove_dead_writers();
+    expect_sound(*store);
+    EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
+    EXPECT_TRUE(!acknowledged || store->exists(sha256_hex(bytes_of(kText))));
+    EXPECT_EQ(read(*store, put(*store).value().sha256), kText);
+  }
+};
+
+TEST_P(BlobCrash, AKillAfterAnyCallLosesNothingAcknowledged) {
+  for (const bool power_cut : {false, true}) {
+    bool killed = true;
+    for (int call = 0; killed; ++call) {
+      clear();
+      FaultyFiles files;
+      bool acknowledged = false;
+      try {
+        const auto store = BlobStore::open(folder_, files).value();
+        files.kill_at = files.calls + call;
+        acknowledged = put(*store).has_value();
+        killed = false;
+      } catch (const Killed&) {
+      }
+      if (power_cut) files.cut_power();
+      SCOPED_TRACE("after call " + std::to_string(call) + (power_cut ? " with a power cut" : ""));
+      expect_recovers(acknowledged);
+      ASSERT_LT(call, 100);
+    }
+  }
+}
+
+TEST_P(BlobCrash, AKillWhileTheStoreIsMadeIsMendedByTheNextStart) {
+  for (int call = 0; call < 270; call += 9) {  // 259 folders and their syncs
+    clear();
+    FaultyFiles files;
+    files.kill_at = call;
+    try {
+      static_cast<void>(BlobStore::open(folder_, files));
+    } catch (const Killed&) {
+    }
+    files.cut_power();
+    std::filesystem::create_directories(folder_);
+    expect_recovers(false);
+  }
+}
+
+TEST_P(BlobCrash, AFailureOfAnyCallIsToldAndLeavesNothingHalf) {
+  for (const int error : {EIO, ENOSPC}) {
+    bool failed = true;
+    for (int call = 0; failed; ++call) {
+      clear();
+      FaultyFiles files;
+      files.error = error;
+      const auto store = BlobStore::open(folder_, files).value();
+      files.fail_at = files.calls + call;
+      const auto stored = put(*store);
+      failed = !files.failed_call.empty();
+      SCOPED_TRACE("call " + std::to_string(call) + " " + files.failed_call);
+      // A folder or a read-only file that does not close properly has lost nothing.
+      if (failed && files.failed_call != "close") {
+        ASSERT_FALSE(stored);
+        EXPECT_EQ(stored.error().code, error == ENOSPC ? "disk_full" : "io_failed");
+      }
+      files.cut_power();
+      expect_recovers(stored.has_value());
+      ASSERT_LT(call, 100);
+    }
+  }
+}
+
+TEST_P(BlobCrash, InterruptedAndShortCallsAreCarriedOn) {
+  FaultyFiles files;
+  const auto store = BlobStore::open(folder_, files).value();
+  files.interrupt = files.short_writes = true;
+  const auto stored = put(*store);
+  ASSERT_TRUE(stored);
+  files.interrupt = files.short_writes = false;
+  EXPECT_EQ(read(*store, stored->sha256), kText);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, BlobCrash, ::testing::Values(Way::upload, Way::adoption),
+                         [](const auto& param) { return param.param == Way::upload ? "upload" : "adoption"; });
+
+}  // namespace
+}  // namespace kiln::testing

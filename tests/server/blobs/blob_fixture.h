@@ -1,0 +1,44 @@
+#pragma once
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "server/blobs/blob_store.h"
+
+namespace kiln::testing {
+
+inline std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+class BlobTest : public ::testing::Test {
+ protected:
+  BlobTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "kiln_blobs.XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~BlobTest() override { std::filesystem::remove_all(folder_); }
+
+  static std::string read(const BlobStore& store, const std::string& sha256) {
+    const auto reader = store.open_blob(sha256).value();
+    std::string text(reader.size(), ' ');
+    EXPECT_EQ(reader.read(0, {reinterpret_cast<std::uint8_t*>(text.data()), text.size()}).value(), text.size());
+    return text;
+  }
+  static std::size_t files_in(const std::filesystem::path& folder) {
+    std::size_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) count += entry.is_regular_file();
+    return count;
+  }
+  /// Every blob's bytes hash to its name.
+  static void expect_sound(const BlobStore& store) {
+    store.for_each([&](const std::string& sha256, std::uint64_t) {
+      EXPECT_EQ(sha256_hex(bytes_of(read(store, sha256))), sha256);
+    });
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace kiln::testing

@@ -1,0 +1,66 @@
+#include "server/work/worker_protocol.h"
+
+#include <gtest/gtest.h>
+
+namespace kiln {
+namespace {
+
+TEST(WorkerProtocol, EveryLineComesBackAsItWasSent) {
+  const auto progress = std::get<ProgressEvent>(parse_line(line_json(ProgressEvent{"read", 1, 2, 0.5})).value());
+  EXPECT_EQ(progress.stage, "read");
+  EXPECT_EQ(progress.total, 2U);
+  EXPECT_EQ(progress.fraction, 0.5);
+  const auto artifact = std::get<WorkerArtifact>(parse_line(line_json(WorkerArtifact{"a.glb", "x/y"})).value());
+  EXPECT_EQ(artifact.name, "a.glb");
+  const auto fault = std::get<Fault>(parse_line(line_json(Fault{"code", "a \"message\"\n", "w"})).value());
+  EXPECT_EQ(fault.message, "a \"message\"\n");
+  EXPECT_TRUE(std::holds_alternative<WorkerDone>(parse_line(line_json(WorkerDone{})).value()));
+}
+
+TEST(WorkerProtocol, BytesThatAreNoUtf8StillMakeALine) {
+  EXPECT_TRUE(parse_line(line_json(Fault{"code", "bad \xff byte", ""})));
+}
+
+TEST(WorkerProtocol, WhatIsNotExactlyALineIsNothing) {
+  for (const char* line : {"", "{}", "[]", "null", "{", "{\"done\":1}", "{\"progress\":3}", "{\"other\":true}",
+                           "{\"done\":true,\"fault\":{}}", "{\"progress\":{\"stage\":1}}", "\xff\xfe"}) {
+    EXPECT_FALSE(parse_line(line)) << line;
+  }
+}
+
+TEST(WorkerProtocol, AFractionOutsideZeroToOneIsClamped) {
+  const auto line = parse_line(R"({"progress":{"stage":"s","done":1,"total":1,"fraction":7}})");
+  EXPECT_EQ(std::get<ProgressEvent>(line.value()).fraction, 1);
+}
+
+TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
+  WorkerOrder order;
+  order.inputs.scene = {"a \"b\".gltf", std::string(64, 'a')};
+  order.inputs.resources = {{"x.bin", std::string(64, 'b')}};
+  order.inputs.environment = NamedBlob{"sky.hdr", std::string(64, 'c')};
+  order.recipe = R"({"label":"x"})";
+  order.mode = WorkerMode::plan;
+  order.threads = 3;
+  order.parent = 17;
+  const WorkerOrder back = parse_order(order_json(order)).value();
+  EXPECT_EQ(back.inputs.scene, order.inputs.scene);
+  EXPECT_EQ(back.inputs.resources, order.inputs.resources);
+  EXPECT_EQ(back.inputs.environment, order.inputs.environment);
+  EXPECT_EQ(back.recipe, order.recipe);
+  EXPECT_EQ(back.mode, WorkerMode::plan);
+  EXPECT_EQ(back.threads, 3);
+  EXPECT_EQ(back.parent, 17);
+}
+
+TEST(WorkerProtocol, ResultNamesCannotLeaveTheirFolder) {
+  EXPECT_TRUE(is_artifact_name("scene.glb"));
+  EXPECT_TRUE(is_artifact_name("lod-1_b.glb"));
+  for (const char* name : {"", ".", "..", ".hidden", "a/b", "../a", "a\\b", "a b", "a\nb", "\xc3\xa4"}) {
+    EXPECT_FALSE(is_artifact_name(name)) << name;
+  }
+  EXPECT_FALSE(is_artifact_name(std::string(65, 'a')));
+  EXPECT_FALSE(is_artifact_name(std::string("a\0b", 3)));
+}
+
+}  // namespace
+}  // namespace kiln
