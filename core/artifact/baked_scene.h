@@ -20,15 +20,15 @@ struct BakedLight {
 };
 
 struct BakedScene {
-  Scene scene;             // final geometry and the original materials, textures and lights
-  Transfer transfer;       // of scene.mesh's vertices
+  Scene scene;        // final geometry and the original materials, textures and lights
+  Transfer transfer;  // of scene.mesh's vertices
   BakedLight light;
   float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
 };
 
 struct Encoding {
-  int position_bits = 16;     // over the unit cube, one grid for all primitives (no cracks)
+  int position_bits = 16;  // over the unit cube, one grid for all primitives (no cracks)
   int normal_bits = 12;
   int texcoord_bits = 14;
   int coefficient_bits = 12;  // of each _PRT_n slot over its own range
@@ -39,6 +39,12 @@ struct Encoding {
 Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
 
 /// Reads what write_baked_glb wrote, exactly as a viewer decodes it. Validates every index and range.
+/// Images come encoded; decode_pixels fills in their pixels.
+/// Fails with not_a_baked_scene, unsupported_version, slot_count_mismatch, attribute_missing, draco_damaged,
+/// accessor_count_mismatch, or as import_scene does.
 Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
+
+/// Decodes the images that base colour and emission textures name. One that cannot be decoded keeps empty pixels.
+void decode_pixels(Scene&);
 
 }  // namespace kiln

@@ -8,6 +8,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "core/artifact/draco_header.h"
 #include "core/base/expects.h"
 
 namespace kiln {
@@ -112,27 +113,10 @@ Result<DecodedMesh> copy_out(const draco::Mesh& mesh) {
   return out;
 }
 
-/// Reads a LEB128 number at `at` and moves on; 2^32 - 1 once the bytes end or it grows too long.
-std::uint64_t read_varint(std::span<const std::uint8_t> bytes, std::size_t& at) {
-  std::uint64_t value = 0;
-  for (int shift = 0; shift < 35 && at < bytes.size(); shift += 7) {
-    const std::uint8_t byte = bytes[at++];
-    value |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
-    if (byte < 0x80) return value;
-  }
-  return 0xFFFFFFFF;
-}
-
-/// The sizes that a Draco 2.2 mesh states ahead of its data (format specification, sections 5 and 6), so that a damaged
-/// one cannot make the decoder ask for gigabytes. Edgebreaker may double vertices at non-manifold places afterwards.
+/// Asked ahead, so that a damaged file cannot make the decoder ask for gigabytes.
 bool states_sizes_within(std::span<const std::uint8_t> bytes, const DracoLimits& limits) {
-  constexpr std::size_t kHeader = 11, kMethod = 8, kFlagsHigh = 10;
-  if (bytes.size() <= kHeader || (bytes[kFlagsHigh] & 0x80) != 0) return false;  // we write no metadata
-  const bool edgebreaker = bytes[kMethod] == draco::MESH_EDGEBREAKER_ENCODING;
-  std::size_t at = kHeader + (edgebreaker ? 1 : 0);
-  const std::uint64_t first = read_varint(bytes, at), second = read_varint(bytes, at);
-  const std::uint64_t vertices = edgebreaker ? first : second, faces = edgebreaker ? second : first;
-  return vertices <= limits.max_vertices && faces <= limits.max_triangles;
+  const auto header = read_draco_header(bytes);
+  return header && header->vertices <= limits.max_vertices && header->faces <= limits.max_triangles;
 }
 
 Result<DecodedMesh> decode_checked(std::span<const std::uint8_t> bytes, const DracoLimits& limits) {

@@ -10,6 +10,7 @@
 #include "core/artifact/gltf_check.h"
 #include "core/artifact/gltf_container.h"
 #include "core/artifact/gltf_parse.h"
+#include "core/artifact/image_decode.h"
 #include "core/artifact/json_scan.h"
 
 namespace kiln {
@@ -267,7 +268,35 @@ BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   return read_scene({document, bytes, header}, findings);
 }
 
+/// Which images the bake looks at.
+std::vector<bool> shaded_images(const Scene& scene) {
+  std::vector<bool> out(scene.images.size(), false);
+  for (const Material& m : scene.materials) {
+    for (const int texture : {m.base_color_texture.texture, m.emission_texture.texture}) {
+      const int image = texture < 0 ? -1 : scene.textures[static_cast<std::size_t>(texture)].image;
+      if (image >= 0) out[static_cast<std::size_t>(image)] = true;
+    }
+  }
+  return out;
+}
+
+void decode_pixels_of(Image& image) {
+  const auto header = read_image_header(image.encoded);
+  auto pixels = header ? decode_image(image.encoded, *header) : std::nullopt;
+  if (!pixels) return;
+  image.width = static_cast<int>(header->width);
+  image.height = static_cast<int>(header->height);
+  image.rgba = std::move(*pixels);
+}
+
 }  // namespace
+
+void decode_pixels(Scene& scene) {
+  const std::vector<bool> shaded = shaded_images(scene);
+  for (std::size_t i = 0; i < shaded.size(); ++i) {
+    if (shaded[i]) decode_pixels_of(scene.images[i]);
+  }
+}
 
 Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file) {
   Findings findings("scene.glb");

@@ -107,20 +107,22 @@ class Writer {
       if (name.in_baked) baked_attributes[name.name] = accessor, baked_ids[name.name] = id;
       if (name.in_original) original_attributes[name.name] = accessor, original_ids[name.name] = id;
     }
-    const auto primitive = [&](const json& attributes, const json& ids, std::size_t material) -> json {
-      const json draco{{"bufferView", material < materials ? add_view_again(view) : view}, {"attributes", ids}};
-      return {{"attributes", attributes},
-              {"indices", indices},
-              {"material", material},
-              {"mode", 4},
-              {"extensions", {{kDraco, draco}}}};
-    };
-    json baked = primitive(baked_attributes, baked_ids, materials + material);
+    json baked = primitive_json(baked_attributes, baked_ids, view, indices);
+    baked["material"] = materials + material;
     const PartLook look = part_look(baked_.scene, part);
     baked["extensions"][kTransfer] = {
         {"name", part.name}, {"material", material}, {"albedo", vec(look.albedo)}, {"emission", vec(look.emission)}};
+    json original = primitive_json(original_attributes, original_ids, add_view_again(view), indices);
+    original["material"] = material;
     baked_primitives_.push_back(std::move(baked));
-    original_primitives_.push_back(primitive(original_attributes, original_ids, material));
+    original_primitives_.push_back(std::move(original));
+  }
+
+  static json primitive_json(const json& attributes, const json& ids, std::size_t view, std::size_t indices) {
+    return {{"attributes", attributes},
+            {"indices", indices},
+            {"mode", 4},
+            {"extensions", {{kDraco, {{"bufferView", view}, {"attributes", ids}}}}}};
   }
 
   /// Images keep their index; one whose bytes were lost becomes a white pixel.

@@ -76,6 +76,19 @@ TEST(BakedLook, TexturesAndImagesKeepIndexAndBytes) {
   EXPECT_EQ(read.images.at(2).encoded, white_pixel_png());
 }
 
+TEST(BakedLook, PixelsAreDecodedWhereABaseColourNeedsThem) {
+  BakedScene written = sphere_over_plane(1, 1, false);
+  written.scene.images.push_back({"damaged", "image/png", {1, 2, 3}, 0, 0, {}});
+  written.scene.textures.push_back({1, Wrap::repeat, Wrap::repeat, false});
+  written.scene.materials[1].emission_texture.texture = 1;
+  Scene read = round_trip(written).scene;
+  decode_pixels(read);
+  ASSERT_EQ(read.images[0].rgba.size(), 64u * 64 * 4);
+  EXPECT_EQ(read.images[0].rgba[0], 235);
+  EXPECT_EQ(read.images[0].rgba[4 * 40], 170);
+  EXPECT_TRUE(read.images[1].rgba.empty());
+}
+
 TEST(BakedLook, LightsComeBackFromWorldUnits) {
   BakedScene written = sphere_over_plane(1, 1, false);
   written.scene.lights = {
