@@ -1,0 +1,152 @@
+// reliability.md 3.4: S3, S6-S9, S12.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "server/api/problem.h"
+#include "tests/server/http/raw_client.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+double peak_resident_mb() {
+  std::ifstream file("/proc/self/status");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024;
+  return 0;
+}
+
+void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+TEST(Security, S3AGigabyteStreamsThroughInSmallMemory) {
+  RunningServer server;
+  const std::string piece(1 << 20, '\0');
+  reset_peak();
+  const double before = peak_resident_mb();
+  RawConnection connection(server.port());
+  connection.send(request_text("POST", "/v1/assets", {"Content-Length: " + std::to_string(1024ull << 20)}));
+  for (int i = 0; i < 1024; ++i) ASSERT_TRUE(connection.send(piece));
+  RawReply reply = connection.read_reply(std::chrono::seconds(120));
+  ASSERT_EQ(reply.status, 201) << reply.all;
+  EXPECT_EQ(json::parse(reply.body)["sha256"],  // sha256sum of 1 GiB of zeros
+            "49bc20df15e412a64472421e13fe86ff1c5165e18b2afccf160d4dc19fe68a14");
+  EXPECT_LT(peak_resident_mb() - before, 64);  // issue 2: 1 GB in, server RSS grows under 64 MB
+}
+
+TEST(Security, S6NoOriginIsEverAllowed) {
+  RunningServer server;
+  for (const char* origin : {"null", "https://evil.com", "https://127.0.0.1.evil", "http://localhost:1"}) {
+    RawReply reply = server.get("/v1/jobs", {std::string("Origin: ") + origin});
+    EXPECT_EQ(reply.fields.count("access-control-allow-origin"), 0U);
+    RawReply change = server.raw(request_text("POST", "/v1/jobs/x/cancel", {std::string("Origin: ") + origin}));
+    EXPECT_EQ(change.status, 403) << origin;
+  }
+  EXPECT_EQ(server.raw(request_text("POST", "/v1/jobs/x/cancel", {"Origin: http://127.0.0.1"})).status, 404);
+}
+
+TEST(Security, ANameThatIsNotOursIsMisdirectedWhenNamesAreGiven) {
+  HttpOptions options;
+  options.hosts = loopback_hosts();
+  RunningServer server(options);
+  EXPECT_EQ(server.raw("GET /healthz HTTP/1.1\r\nHost: evil.example:80\r\n\r\n").status, 421);
+  EXPECT_EQ(server.raw("GET /healthz HTTP/1.1\r\nHost: localhost:8080\r\n\r\n").status, 200);
+  EXPECT_EQ(server.raw("GET /healthz HTTP/1.1\r\nHost: [::1]:8080\r\n\r\n").status, 200);
+}
+
+TEST(Security, S7PagesCarryTheirPolicyAndEveryReplyTheOtherFields) {
+  RunningServer server;
+  for (const char* path : {"/", "/view/01JOB", "/docs"}) {
+    RawReply page = server.get(path);
+    EXPECT_EQ(page.status, 200) << path;
+    EXPECT_EQ(
+        page.fields["content-security-policy"],
+        "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; style-src 'self'; "
+        "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+  }
+  for (const char* path : {"/", "/v1/jobs", "/healthz", "/nowhere", "/%zz"}) {
+    RawReply reply = server.get(path);
+    EXPECT_EQ(reply.fields["x-content-type-options"], "nosniff") << path;
+    EXPECT_EQ(reply.fields["referrer-policy"], "no-referrer") << path;
+    EXPECT_EQ(reply.fields.count("content-security-policy"), 1U) << path;
+    EXPECT_FALSE(reply.fields["x-request-id"].empty()) << path;
+  }
+}
+
+TEST(Security, S7NoAnswerIsEverCompressedOnTheFly) {
+  RunningServer server;
+  RawReply reply = server.get("/openapi.json", {"Accept-Encoding: br, gzip"});
+  EXPECT_EQ(reply.fields.count("content-encoding"), 0U);
+  EXPECT_TRUE(json::parse(reply.body, nullptr, false).is_object());
+}
+
+TEST(Security, S9LogLinesStayOneJsonLineWhateverStrangersSend) {
+  RunningServer server;
+  server.get("/%7B%22level%22:%22fatal%22%7D");
+  server.get("/" + std::string(3000, 'x'), {"X-Request-Id: \"}{"});
+  server.raw("GET / HTTP/9\r\n\r\n");
+  for (const std::string& line : server.log()) {
+    EXPECT_EQ(line.find('\n'), std::string::npos);
+    const json entry = json::parse(line, nullptr, false);
+    ASSERT_TRUE(entry.is_object()) << line;
+    EXPECT_EQ(entry["level"], "info");
+    EXPECT_LE(entry["path"].get<std::string>().size(), kMaxLogField);
+  }
+  AccessEntry nasty;
+  nasty.path = "a\n{\"level\":\"fatal\"}\x1b[2J\xff";
+  const std::string line = access_line(nasty);
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+  EXPECT_EQ(line.find('\x1b'), std::string::npos);
+  EXPECT_EQ(json::parse(line)["path"].get<std::string>().substr(0, 2), "a\n");
+}
+
+TEST(Security, S9TheQueryIsNotLogged) {
+  RunningServer server;
+  server.get("/v1/jobs?label=secret");
+  EXPECT_EQ(server.log().at(0).find("secret"), std::string::npos);
+}
+
+TEST(Security, S12ProblemsHaveACodeARequestIdAndNoInnards) {
+  RunningServer server;
+  const std::vector<std::string> requests = {
+      "nonsense\r\n\r\n",
+      request_text("GET", "/v1/jobs/../../etc/passwd"),
+      request_text("GET", "/v1/jobs?limit=x"),
+      request_text("GET", "/v1/jobs/none"),
+      request_text("POST", "/v1/jobs", {"Content-Type: application/json"}, "{\"a\":"),
+      request_text("POST", "/v1/jobs", {"Content-Type: application/json"}, "[1]"),
+      request_text("POST", "/v1/jobs", {"Content-Type: application/json"}, std::string(5000, '[')),
+      request_text("POST", "/v1/jobs", {"Content-Type: application/json"}, "{\"label\":\"\xff\"}"),
+      request_text("POST", "/v1/jobs", {"Content-Type: application/json"}, "{\"seed\":1,\"seed\":2}"),
+      request_text("POST", "/v1/jobs", {"Content-Type: multipart/form-data"}, "x"),
+      request_text("POST", "/v1/jobs", {"Content-Type: multipart/form-data; boundary=b"}, "--b"),
+      request_text("PUT", "/v1/jobs?preset=nope", {}, "x"),
+      request_text("PUT", "/v1/assets/zz", {}, "x"),
+      request_text("PUT", "/v1/assets/" + kSha, {"Upload-Offset: 7"}, "x"),
+  };
+  for (const std::string& text : requests) {
+    SCOPED_TRACE(text.substr(0, 200));
+    RawReply reply = server.raw(text);
+    EXPECT_GE(reply.status, 400);
+    EXPECT_LT(reply.status, 500);
+    const auto problem = parse_problem(reply.body);
+    ASSERT_TRUE(problem.has_value()) << reply.all;
+    EXPECT_FALSE(problem->code.empty());
+    EXPECT_EQ(problem->request_id, reply.fields["x-request-id"]);
+    EXPECT_EQ(problem->detail.find('/'), std::string::npos) << problem->detail;
+    for (const char* innard : {"std::", "nlohmann", "json.exception", "kiln-http", "/tmp", "sqlite"})
+      EXPECT_EQ(reply.body.find(innard), std::string::npos) << innard;
+  }
+}
+
+TEST(Security, AClientsOwnRequestIdComesBack) {
+  RunningServer server;
+  EXPECT_EQ(server.get("/healthz", {"X-Request-Id: abc-123"}).fields.at("x-request-id"), "abc-123");
+}
+
+}  // namespace
+}  // namespace kiln
