@@ -1,0 +1,167 @@
+// kill -9 of workers and of the server at random moments of 50 bakes: no acknowledged job is lost, every artefact has
+// the hash it is named by, nothing runs for ever, nothing temporary stays.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "core/base/sha256.h"
+#include "tests/faults/daemon.h"
+
+namespace kiln::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kJobs = 50;
+constexpr int kServerKills = 8;
+constexpr int kWorkerKills = 12;
+constexpr unsigned kSeed = 20261122;
+
+std::string sha256_of(const std::string& text) {
+  return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+class KillTest : public ::testing::Test {
+ protected:
+  KillTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "kiln_faults.XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+    start();
+    scene_ = sha256_of(cube_glb());
+    EXPECT_EQ(http_put(daemon_->port(), "/v1/assets/" + scene_, cube_glb()).status, 201);
+  }
+  ~KillTest() override {
+    daemon_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  void start() {
+    daemon_.reset();
+    daemon_ =
+        std::make_unique<Daemon>(KILN_DAEMON, folder_ / "data",
+                                 std::vector<std::string>{"--workers", "2", "--threads", "1", "--first-retry-s", "0.1",
+                                                          "--soft-free-percent", "0", "--hard-free-percent", "0"});
+  }
+
+  /// Submits until the server answers; the idempotency key makes a second try the same job.
+  std::string submit(int seed) {
+    for (int attempt = 0; attempt < 100; ++attempt) {
+      const Answer answer = http_post(daemon_->port(), "/v1/jobs", cube_job(scene_, seed),
+                                      {{"Idempotency-Key", "cube-" + std::to_string(seed)}});
+      if (answer.status == 200 || answer.status == 202) return json::parse(answer.body).at("id");
+      ADD_FAILURE() << "submit answered " << answer.status << " " << answer.body;
+      std::this_thread::sleep_for(20ms);
+    }
+    return {};
+  }
+
+  json job(const std::string& id) {
+    const Answer answer = http_get(daemon_->port(), "/v1/jobs/" + id);
+    EXPECT_EQ(answer.status, 200) << "acknowledged job " << id << " is lost";
+    return answer.status == 200 ? json::parse(answer.body) : json{{"status", "lost"}, {"artifacts", json::array()}};
+  }
+
+  /// Kills one worker whose job was not hit before: a second crash would rightly fail it.
+  bool kill_a_worker() {
+    for (const auto& [pid, id] : daemon_->workers()) {
+      if (!hit_.insert(id).second) continue;
+      ::kill(pid, SIGKILL);
+      return true;
+    }
+    return false;
+  }
+
+  void expect_sound(const json& job) {
+    EXPECT_EQ(job["status"], "succeeded") << job.dump();
+    EXPECT_FALSE(job["artifacts"].empty());
+    for (const json& artifact : job["artifacts"]) {
+      const Answer file = http_get(daemon_->port(), artifact["url"]);
+      EXPECT_EQ(sha256_of(file.body), artifact["sha256"]) << artifact.dump();
+      EXPECT_EQ(file.body.size(), artifact["bytes"]);
+    }
+  }
+
+  static int entries(const std::filesystem::path& folder) {
+    return static_cast<int>(std::distance(std::filesystem::directory_iterator(folder), {}));
+  }
+
+  std::filesystem::path folder_;
+  std::unique_ptr<Daemon> daemon_;
+  std::string scene_;
+  std::set<std::string> hit_;
+};
+
+TEST_F(KillTest, NoAcknowledgedJobIsLostWhoeverIsKilled) {
+  std::mt19937 random(kSeed);
+  std::uniform_int_distribution<int> pause_ms(5, 150);
+  const auto deadline = Clock::now() + 50s;
+  std::vector<std::string> acknowledged;
+  int server_kills = 0, worker_kills = 0;
+  while (static_cast<int>(acknowledged.size()) < kJobs || server_kills < kServerKills) {
+    ASSERT_LT(Clock::now(), deadline) << "too slow: " << acknowledged.size() << " jobs";
+    for (int i = 0; i < 4 && static_cast<int>(acknowledged.size()) < kJobs; ++i) {
+      acknowledged.push_back(submit(static_cast<int>(acknowledged.size())));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(pause_ms(random)));
+    if (worker_kills < kWorkerKills && random() % 2 == 0 && kill_a_worker()) ++worker_kills;
+    if (server_kills < kServerKills && random() % 3 == 0) {
+      daemon_->kill_hard();
+      start();
+      ++server_kills;
+    }
+  }
+  EXPECT_GT(worker_kills, 0);
+
+  for (const std::string& id : acknowledged) {
+    json now = job(id);
+    while ((now["status"] == "queued" || now["status"] == "running") && Clock::now() < deadline) {
+      now = json::parse(http_get(daemon_->port(), "/v1/jobs/" + id + "?wait=5").body);
+    }
+    expect_sound(now);
+  }
+  EXPECT_EQ(std::set(acknowledged.begin(), acknowledged.end()).size(), acknowledged.size());
+  EXPECT_TRUE(daemon_->workers().empty());
+
+  const int status = daemon_->terminate();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_EQ(entries(folder_ / "data" / "work"), 0);
+  EXPECT_EQ(entries(folder_ / "data" / "tmp"), 0);
+  for (const auto& file : std::filesystem::recursive_directory_iterator(folder_ / "data" / "cas")) {
+    if (!file.is_regular_file()) continue;
+    std::ifstream in(file.path(), std::ios::binary);
+    std::stringstream text;
+    text << in.rdbuf();
+    EXPECT_EQ(sha256_of(text.str()), file.path().filename());
+  }
+  std::printf("{\"jobs\":%d,\"server_kills\":%d,\"worker_kills\":%d}\n", kJobs, server_kills, worker_kills);
+}
+
+TEST_F(KillTest, TermPutsRunningJobsBackAndTheNextStartFinishesThem) {
+  std::vector<std::string> ids;
+  for (int seed = 100; seed < 106; ++seed) ids.push_back(submit(seed));
+  const int status = daemon_->terminate();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_EQ(entries(folder_ / "data" / "work"), 0);
+  start();
+  for (const std::string& id : ids) {
+    const json done = json::parse(http_get(daemon_->port(), "/v1/jobs/" + id + "?wait=30").body);
+    expect_sound(done);
+    EXPECT_LE(done["attempt"], 1) << "a drain must not cost an attempt";
+  }
+}
+
+}  // namespace
+}  // namespace kiln::testing
