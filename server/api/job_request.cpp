@@ -189,7 +189,7 @@ Answer<JobRequest> parse_job_request(std::string_view text, const JobFiles& file
   return parse_document(std::move(document), files, true);
 }
 
-Answer<JobRequest> parse_raw_request(const QueryParams& params) {
+Answer<JobRequest> parse_raw_request(const QueryParams& params, const JobFiles& files) {
   const std::vector<std::string> names = {"preset", "label", "environment", "force", "quality", "seed", "name"};
   auto values = take_params(params, names);
   if (!values) return tl::make_unexpected(values.error());
@@ -206,7 +206,7 @@ Answer<JobRequest> parse_raw_request(const QueryParams& params) {
     const auto seed = parse_decimal(value[5]);
     document["seed"] = seed ? json(*seed) : json(value[5]);
   }
-  return parse_document(std::move(document), {}, false);
+  return parse_document(std::move(document), files, false);
 }
 
 Answer<std::vector<std::string>> take_params(const QueryParams& params, const std::vector<std::string>& allowed) {

@@ -37,7 +37,7 @@ Answer<JobRequest> parse_job_request(std::string_view json, const JobFiles& file
 
 /// The job of a raw upload (its scene still unnamed), from its query: preset (required), label, environment, force,
 /// quality, seed, name (of the scene). environment is the name of a built-in sky, r,g,b, or the sha256 of an asset.
-Answer<JobRequest> parse_raw_request(const QueryParams&);
+Answer<JobRequest> parse_raw_request(const QueryParams&, const JobFiles& files = {});
 
 struct JobListRequest {
   std::string status;  // empty: all

@@ -18,6 +18,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"bad_query", 400},
     {"bad_header", 400},
     {"incomplete_body", 400},
+    {"unauthorized", 401},
     {"cross_origin", 403},
     {"not_found", 404},
     {"method_not_allowed", 405},

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <chrono>
 
+#include "server/http/auth.h"
 #include "server/http/parse_head.h"
 #include "server/http/write_reply.h"
 
@@ -32,6 +33,13 @@ std::string_view host_name(std::string_view host) {
 std::string_view without_scheme(std::string_view origin) {
   const std::size_t at = origin.find("://");
   return at == std::string_view::npos ? std::string_view() : origin.substr(at + 3);
+}
+
+/// What probes ask without a token: whether we live, and which version.
+bool is_open_to_all(const RouteMatch& match) {
+  if (match.endpoint == nullptr) return false;
+  const std::string_view name = match.endpoint->operation;
+  return name == "health" || name == "readiness" || name == "version";
 }
 
 Reply not_found() { return problem_reply(make_problem("not_found", "there is nothing at this address")); }
@@ -102,6 +110,8 @@ Answer<void> Exchange::check_origin(const Head& head) const {
 
 Answer<void> Exchange::check(const Head& head, const RouteMatch& match) const {
   if (auto origin = check_origin(head); !origin) return origin;
+  if (!rules_.token_hashes.empty() && !is_open_to_all(match) && !carries_token(head, rules_.token_hashes))
+    return refuse("unauthorized", "this server asks for a token: Authorization: Bearer TOKEN");
   if (match.endpoint == nullptr) return {};
   const std::string_view expect = field_of(head, "expect");
   if (!expect.empty() && expect != "100-continue")

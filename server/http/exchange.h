@@ -15,7 +15,8 @@ namespace kiln {
 
 struct ExchangeRules {
   std::uint64_t max_upload_bytes = 8ull << 30;
-  std::vector<std::string> hosts;  // names a Host field may have; empty: any
+  std::vector<std::string> hosts;         // names a Host field may have; empty: any
+  std::vector<std::string> token_hashes;  // who may come in (auth.h); empty: everybody
 };
 
 class Exchange {

@@ -25,10 +25,11 @@ struct HttpOptions {
   int max_uploads = 16;
   int max_streams = 48;  // event streams and long polls
   int max_downloads = 16;
-  int quick_threads = 16;          // beside those
-  std::vector<std::string> hosts;  // names a Host field may have; empty: any. A local server should list its own
-  LogLine log = log_to_stderr;     // one JSON line per request; empty: none
-  FrontOptions front;              // address, port and threads are taken from above
+  int quick_threads = 16;                 // beside those
+  std::vector<std::string> hosts;         // names a Host field may have; empty: any. A local server should list its own
+  std::vector<std::string> token_hashes;  // from read_token_hashes (auth.h); empty: nobody is asked
+  LogLine log = log_to_stderr;            // one JSON line per request; empty: none
+  FrontOptions front;                     // address, port and threads are taken from above
 };
 
 /// Host names of a server that only this machine should reach: guards against DNS rebinding.

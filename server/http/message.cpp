@@ -55,6 +55,10 @@ Reply problem_reply(const Problem& problem) {
   reply.fields.push_back({"content-type", kProblemType});
   reply.fields.push_back({"cache-control", "no-store"});
   if (problem.status == 429 || problem.status == 503) reply.fields.push_back({"retry-after", "2"});
+  if (problem.status == 401) {  // a browser asks its user for the second
+    reply.fields.push_back({"www-authenticate", "Bearer realm=\"kiln\""});
+    reply.fields.push_back({"www-authenticate", "Basic realm=\"kiln\", charset=\"UTF-8\""});
+  }
   if (problem.status == 507) reply.fields.push_back({"retry-after", "60"});
   reply.body = problem_json(problem);
   return reply;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <thread>
 
+#include "server/http/auth.h"
 #include "server/http/http_server.h"
 #include "server/kilnd/options.h"
 #include "server/work/bake_worker.h"
@@ -18,7 +19,8 @@ namespace {
 
 int complain(const Fault& fault) {
   std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
-  return fault.code == "data_in_use" || fault.code == "schema_too_new" ? kExitConfig : 1;
+  const bool config = fault.code == "data_in_use" || fault.code == "schema_too_new" || fault.code == "bad_token_file";
+  return config ? kExitConfig : 1;
 }
 
 sigset_t end_signals() {
@@ -40,13 +42,17 @@ std::thread drain_on_signal(HttpServer& server, Service& service) {
   });
 }
 
-HttpOptions http_options(const DaemonOptions& options) {
+Result<HttpOptions> http_options(const DaemonOptions& options) {
   HttpOptions http;
   http.address = options.address;
   http.port = options.port;
   http.max_upload_bytes = options.max_upload_mb << 20;
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
+  if (!options.token_file.empty()) {
+    KILN_TRY(hashes, read_token_hashes(options.token_file));
+    http.token_hashes = std::move(hashes);
+  }
   return http;
 }
 
@@ -59,9 +65,11 @@ int serve(const DaemonOptions& options) {
   const sigset_t ends = end_signals();
   ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the first thread
   ::signal(SIGPIPE, SIG_IGN);
+  const auto http = http_options(options);
+  if (!http) return complain(http.error());
   auto service = Service::open(options.service);
   if (!service) return complain(service.error());
-  HttpServer server(http_options(options), **service);
+  HttpServer server(*http, **service);
   const auto port = server.bind();
   if (!port) return complain(port.error());
   std::thread drain = drain_on_signal(server, **service);
