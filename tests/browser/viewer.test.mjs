@@ -142,7 +142,10 @@ test('the address carries the whole view, there and back', () =>
     await page.locator('#c-slot').fill('5');
     await page.focus('.stage');
     await page.keyboard.press('ArrowRight');
-    await until(page, () => /pose=/.test(location.hash) && /slot=5/.test(location.hash));
+    await until(page, () => {
+      const wanted = window.kilnViewer.stage.pose.map((value) => Number(value.toFixed(3))).join(',');
+      return location.hash.includes(`pose=${wanted}`) && /slot=5/.test(location.hash);
+    });
     const [address, pose] = await page.evaluate(() => [location.href, window.kilnViewer.stage.pose]);
     await page.goto('about:blank');
     await page.goto(address);

@@ -26,11 +26,14 @@ export interface LoadedAsset {
 
 export type DownloadProgress = (loaded: number, total: number) => void;
 
-/// Downloads and parses. `signal` stops the download.
-export async function loadGltf(url: string, progress: DownloadProgress, signal: AbortSignal): Promise<LoadedAsset> {
-  const decoder = new DRACOLoader().setDecoderPath({ js: decoderScript, wasm: decoderWasm }).setWorkerLimit(2).preload();
+/// Fetches the decoder; call it early.
+export const createDecoder = (): DRACOLoader =>
+  new DRACOLoader().setDecoderPath({ js: decoderScript, wasm: decoderWasm }).setWorkerLimit(2).preload();
+
+/// Downloads and parses. The decoder is the asset's from then on.
+export async function loadGltf(url: string, decoder: DRACOLoader, progress: DownloadProgress): Promise<LoadedAsset> {
   try {
-    const file = await download(url, progress, signal);
+    const file = await download(url, progress);
     return await parse(file, decoder);
   } catch (error) {
     decoder.dispose();
@@ -84,8 +87,8 @@ function forgetCompressed(parser: GLTFParser, json: Json): void {
   }
 }
 
-async function download(url: string, progress: DownloadProgress, signal: AbortSignal): Promise<ArrayBuffer> {
-  const response = await fetch(url, { signal });
+async function download(url: string, progress: DownloadProgress): Promise<ArrayBuffer> {
+  const response = await fetch(url);
   if (!response.ok || !response.body) throw new Error(`the server answered ${response.status} for ${new URL(response.url).pathname}`);
   const total = Number(response.headers.get('Content-Length') ?? 0);
   const chunks: Uint8Array<ArrayBuffer>[] = [];

@@ -20,11 +20,14 @@ export function decodeAttributes(
   const stride = shape.channels * shape.slots;
   const vertices = attributes.length > 0 ? attributes[0].length / 4 : 0;
   const out = new Float32Array(vertices * stride);
-  for (let slot = 0; slot < stride; ++slot) {
-    const stored = attributes[slot >> 2];
-    const [factor, shift] = [scale[slot], offset[slot]];
-    for (let v = 0, from = slot & 3, to = slot; v < vertices; ++v, from += 4, to += stride) out[to] = shift + factor * stored[from];
-  }
+  const [factors, shifts] = [Float64Array.from(scale), Float64Array.from(offset)];
+  attributes.forEach((stored, k) => {
+    const first = 4 * k;
+    const width = Math.min(4, stride - first); // the last attribute may be padded
+    for (let v = 0; v < vertices; ++v) {
+      for (let i = 0; i < width; ++i) out[v * stride + first + i] = shifts[first + i] + factors[first + i] * stored[4 * v + i];
+    }
+  });
   return out;
 }
 

@@ -38,7 +38,7 @@ interface Operation {
 }
 
 interface Document {
-  info: { title: string; version: string; description?: string };
+  info: { title: string; version: string; summary?: string; description?: string };
   paths: Record<string, Record<string, Operation> & { parameters?: Parameter[] }>;
   [key: string]: unknown;
 }
@@ -108,10 +108,10 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
     h('summary', {}, h('span', { class: `method method-${method}` }, method.toUpperCase()), h('code', {}, path), h('span', { class: 'hint' }, op.summary ?? '')),
     op.description ? h('p', {}, op.description) : null,
     parameterTable([...shared, ...(op.parameters ?? [])]),
-    request ? h('h3', {}, 'Body') : null,
+    request ? h('h2', {}, 'Body') : null,
     request?.description ? h('p', {}, request.description) : null,
     ...bodies(request?.content),
-    answers.length ? h('h3', {}, 'Answers') : null,
+    answers.length ? h('h2', {}, 'Answers') : null,
     h('ul', { class: 'answers' }, ...answers),
     h('p', { class: 'curl' }, h('code', {}, curl), ' ', h('button', { type: 'button', 'aria-label': `Copy the command for ${method} ${path}`, onclick: () => void copyText(curl, 'Command') }, 'Copy')),
   );
@@ -119,7 +119,7 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
 
 function show(main: HTMLElement): void {
   const { info, paths } = openapi;
-  main.append(h('p', { class: 'lead' }, info.description ?? '', ' ', h('a', { href: '/openapi.json' }, 'openapi.json'), `, version ${info.version}`));
+  main.append(h('p', { class: 'lead' }, info.description ?? info.summary ?? '', ' ', h('a', { href: '/openapi.json' }, 'openapi.json'), `, version ${info.version}`));
   for (const [path, item] of Object.entries(paths)) {
     for (const method of kMethods) if (item[method]) main.append(operation(path, method, item[method], item.parameters ?? []));
   }

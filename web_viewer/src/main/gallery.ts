@@ -1,6 +1,6 @@
 // The page at `/`: all jobs, alive.
 
-import { cancelJob, deleteJob, follow, kStatuses, listJobs, type Job } from '../asset/jobs';
+import { cancelJob, deleteJob, finished, follow, kStatuses, listJobs, type Job } from '../asset/jobs';
 import { announce, h, toast } from '../ui/dom';
 import { pageHeader } from '../ui/header';
 import { JobCard } from '../ui/job_card';
@@ -62,6 +62,12 @@ function show(job: Job): void {
   showEmpty();
 }
 
+/// A list may arrive after an event that is newer than it.
+function outdated(job: Job): boolean {
+  const known = cards.get(job.id)?.job;
+  return known !== undefined && finished(known) && !finished(job) && known.attempt >= job.attempt;
+}
+
 function showEmpty(): void {
   const visible = [...cards.values()].some((card) => !card.element.hidden);
   empty.hidden = visible;
@@ -71,7 +77,7 @@ function showEmpty(): void {
 async function load(from: string): Promise<void> {
   try {
     const page = await listJobs({ status: statusFilter.value, cursor: from });
-    page.jobs.forEach(show);
+    page.jobs.filter((job) => !outdated(job)).forEach(show);
     cursor = page.next_cursor ?? '';
     more.hidden = cursor === '';
     showEmpty();
@@ -86,10 +92,9 @@ function filter(): void {
 }
 
 function connected(yes: boolean): void {
-  const before = connection.dataset.live;
   connection.dataset.live = String(yes);
   connection.textContent = yes ? 'live' : 'reconnecting';
-  if (yes && before === 'false') void load(''); // whatever happened meanwhile
+  if (yes) void load(''); // whatever happened before the stream was open
 }
 
 function build(): void {

@@ -1,7 +1,7 @@
 // The page at `/view/{id}`: waits for the job, loads its scene.glb, shows it.
 
 import { artifact, artifactUrl, explain, finished, follow, getJob, getReport, type Job, type Report } from '../asset/jobs';
-import { loadGltf } from '../asset/load_gltf';
+import { createDecoder, loadGltf } from '../asset/load_gltf';
 import { Relighter } from '../light/relighter';
 import { kSkies } from '../light/skies';
 import { announce, copyText, h, replaceChildren, toast } from '../ui/dom';
@@ -142,19 +142,30 @@ function acceptEnvironments(panel: ViewPanel): void {
   undo.push(() => window.removeEventListener('dragover', over), () => window.removeEventListener('drop', drop));
 }
 
-async function show(job: Job): Promise<void> {
+interface Tools {
+  decoder: ReturnType<typeof createDecoder>;
+  relighter: Relighter;
+  stage: Stage;
+}
+
+/// What takes time and does not depend on the job: begun while the job is asked for.
+function createTools(): Tools {
+  const [decoder, relighter] = [createDecoder(), new Relighter()];
+  undo.push(() => decoder.dispose(), () => relighter.dispose());
+  const stage = createStage();
+  undo.push(() => stage.dispose());
+  return { decoder, relighter, stage };
+}
+
+async function show(job: Job, tools: Tools): Promise<void> {
   const file = artifact(job, 'scene.glb');
   if (job.status !== 'succeeded' || !file) throw new Error(job.error ? explain(job.error) : `The job is ${job.status}; there is nothing to show.`);
   const loaded = (done: number, total: number) =>
     showOverlay(total ? `Loading ${bytes(done)} of ${bytes(total)}` : `Loading ${bytes(done)}`, total ? done / total : null);
   const report: Promise<Report | null> = artifact(job, 'report.json') ? getReport(job).catch(() => null) : Promise.resolve(null);
-  const loading = loadGltf(artifactUrl(job, 'scene.glb'), loaded, new AbortController().signal);
-  const relighter = new Relighter();
-  const stage = createStage(); // takes its time: file and worker are on their way meanwhile
-  undo.push(() => stage.dispose());
-  const asset = await loading;
+  const asset = await loadGltf(artifactUrl(job, 'scene.glb'), tools.decoder, loaded);
   const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
-  const viewer = await Viewer.open(stage, asset, state, relighter);
+  const viewer = await Viewer.open(tools.stage, asset, state, tools.relighter);
   undo.push(() => viewer.dispose());
   overlay.hidden = true;
   performance.mark('kiln:first-picture');
@@ -209,12 +220,16 @@ async function start(): Promise<void> {
   document.body.append(pageHeader(title), main, help);
   showOverlay('Asking for the job', null);
   try {
-    const job = await getJob(id);
+    const asked = getJob(id);
+    asked.catch(() => undefined); // is awaited below
+    const tools = createTools();
+    const job = await asked;
     title.textContent = job.label || id;
     document.title = `${job.label || id} – Kiln`;
-    await show(await whenFinished(job));
+    await show(await whenFinished(job), tools);
   } catch (error) {
     showFailure((error as Error).message);
+    dispose();
   }
 }
 
