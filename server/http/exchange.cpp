@@ -102,8 +102,10 @@ Answer<void> Exchange::check_origin(const Head& head) const {
   if (!rules_.hosts.empty() && !host.empty() &&
       std::find(rules_.hosts.begin(), rules_.hosts.end(), host_name(host)) == rules_.hosts.end())
     return refuse("misdirected", "this server does not answer under that Host name");
-  const bool foreign = !origin.empty() && without_scheme(origin) != host;
-  if (changes_something(head) && (foreign || field_of(head, "sec-fetch-site") == "cross-site"))
+  const std::string_view site = field_of(head, "sec-fetch-site");  // only browsers send it, and truthfully
+  const bool foreign =
+      site.empty() ? !origin.empty() && without_scheme(origin) != host : site != "same-origin" && site != "none";
+  if (changes_something(head) && foreign)
     return refuse("cross_origin", "pages of other origins may not change anything here");
   return {};
 }
@@ -134,8 +136,9 @@ Reply Exchange::dispatch(Request& request, const RouteMatch& match) {
     return file ? std::move(*file) : not_found();
   }
   if (!takes_body(*match.endpoint)) return (*match.handler)(request);
-  const Pass pass = uploads_.enter();
-  if (!pass) return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
+  request.upload = uploads_.enter();
+  if (!request.upload)
+    return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
   return (*match.handler)(request);
 }
 
@@ -193,7 +196,8 @@ bool Exchange::serve(Connection& connection, std::string_view head_text, const s
   entry.seconds = seconds_since(begin);
   metrics_.request(entry.operation, entry.status, entry.seconds);
   if (log_) log_(access_line(entry));
-  return understood && body.drained();
+  // After a refusal bytes may still be on their way, announced or not.
+  return reply.status < 400 && body.drained();
 }
 
 }  // namespace kiln

@@ -13,6 +13,7 @@
 
 #include "server/api/job_request.h"
 #include "server/api/problem.h"
+#include "server/http/gate.h"
 
 namespace kiln {
 
@@ -73,6 +74,7 @@ struct Request {
   std::vector<std::pair<std::string, std::string>> path_params;  // {id} of the route, in order
   BodySource* body = nullptr;
   Sink* client = nullptr;  // for client_gone() while waiting
+  Pass upload;             // the place among the uploads; a handler that has read the body may leave it
   std::string id;          // X-Request-Id
   std::string peer;        // address
 };

@@ -30,6 +30,7 @@ Result<Job> wait_for(RouteContext& context, Request& request, const std::string&
 
 Reply created_reply(RouteContext& context, Request& request, const Created& created, int wait) {
   Job job = created.job;
+  request.upload.reset();  // who waits for a bake does not keep others from uploading
   if (wait > 0) {
     const Pass pass = context.streams.enter();  // without one the answer simply comes at once
     if (pass)

@@ -6,7 +6,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/base/sha256.h"
 #include "server/api/problem.h"
+#include "server/http/auth.h"
 #include "tests/server/http/raw_client.h"
 
 namespace kiln {
@@ -22,6 +24,43 @@ double peak_resident_mb() {
 }
 
 void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+TEST(Security, S2OneOfTheTokensOpensAndNothingElseDoes) {
+  const std::string token = "Abc_-" + std::string(38, 'z');
+  HttpOptions options;
+  options.token_hashes = {sha256_hex({reinterpret_cast<const std::uint8_t*>(token.data()), token.size()})};
+  RunningServer server(options);
+  const auto status = [&](const std::string& value) {
+    return server.get("/v1/jobs", {"Authorization: " + value}).status;
+  };
+  EXPECT_EQ(server.get("/v1/jobs").status, 401);
+  EXPECT_EQ(server.get("/").status, 401);
+  EXPECT_EQ(server.get("/nowhere").status, 401);
+  EXPECT_EQ(server.get("/healthz").status, 200);
+  EXPECT_EQ(status("Bearer " + token), 200);
+  EXPECT_EQ(status("Basic bWU6QWJjXy16enp6enp6enp6enp6enp6enp6enp6enp6enp6enp6enp6enp6eg=="), 200);  // me:token
+  EXPECT_EQ(status("Bearer " + token.substr(1)), 401);
+  EXPECT_EQ(status("Bearer " + token + "z"), 401);
+  EXPECT_EQ(status("Bearer %41" + token.substr(1)), 401);
+  EXPECT_EQ(status("Bearer"), 401);
+  EXPECT_EQ(status("Basic !!!"), 401);
+  EXPECT_EQ(server.get("/v1/jobs", {"Authorization: Bearer x", "Authorization: Bearer " + token}).status, 401);
+  for (const std::string& line : server.log()) EXPECT_EQ(line.find(token), std::string::npos);
+}
+
+TEST(Security, S2ATokenFileIsReadStrictly) {
+  FakeService place;
+  const std::string file = place.folder() / "tokens";
+  const auto read = [&](const std::string& text) {
+    std::ofstream(file) << text;
+    return read_token_hashes(file);
+  };
+  const std::string token(43, 't');
+  EXPECT_EQ(read("# ours\n\n" + token + "\r\n" + token + "\n")->size(), 2U);
+  EXPECT_EQ(read(token + "\nshort\n").error().where, "line 2");
+  EXPECT_EQ(read("# nothing\n").error().code, "bad_token_file");
+  EXPECT_EQ(read_token_hashes(file + ".none").error().code, "bad_token_file");
+}
 
 TEST(Security, S3AGigabyteStreamsThroughInSmallMemory) {
   RunningServer server;
@@ -47,6 +86,14 @@ TEST(Security, S6NoOriginIsEverAllowed) {
     EXPECT_EQ(change.status, 403) << origin;
   }
   EXPECT_EQ(server.raw(request_text("POST", "/v1/jobs/x/cancel", {"Origin: http://127.0.0.1"})).status, 404);
+  // What the browser itself says counts more: behind a proxy Host and Origin may differ.
+  EXPECT_EQ(server.raw(request_text("POST", "/v1/jobs/x/cancel", {"Sec-Fetch-Site: cross-site"})).status, 403);
+  EXPECT_EQ(server.raw(request_text("POST", "/v1/jobs/x/cancel", {"Sec-Fetch-Site: same-site"})).status, 403);
+  EXPECT_EQ(server
+                .raw(request_text("POST", "/v1/jobs/x/cancel",
+                                  {"Origin: https://proxy.example", "Sec-Fetch-Site: same-origin"}))
+                .status,
+            404);
 }
 
 TEST(Security, ANameThatIsNotOursIsMisdirectedWhenNamesAreGiven) {
