@@ -75,7 +75,8 @@ void append_tangents(const RawPart& part, const Affine& to_world, double sign, s
   }
 }
 
-void append_vertices(const RawPart& part, const Affine& to_world, const Wanted& wanted, const Frame& frame, Mesh& mesh) {
+void append_vertices(const RawPart& part, const Affine& to_world, const Wanted& wanted, const Frame& frame,
+                     Mesh& mesh) {
   const double sign = to_world.determinant() < 0 ? -1 : 1;
   const Affine area = cofactors(to_world);
   const std::size_t count = part.position.size();
@@ -93,7 +94,8 @@ void append_vertices(const RawPart& part, const Affine& to_world, const Wanted& 
 /// In the unit cube a face needs an area whose square a float holds, and corners that rounding has not joined.
 bool vanished(const Mesh& mesh, const Triangle& t) {
   constexpr double kLeastTwiceArea = 1e-18;
-  const Vec3d a = to_double(mesh.position[t[0]]), b = to_double(mesh.position[t[1]]), c = to_double(mesh.position[t[2]]);
+  const Vec3d a = to_double(mesh.position[t[0]]), b = to_double(mesh.position[t[1]]),
+              c = to_double(mesh.position[t[2]]);
   return is_degenerate(a, b, c) || length(cross(b - a, c - a)) < kLeastTwiceArea;
 }
 
@@ -113,7 +115,8 @@ std::uint64_t append_triangles(const RawPart& part, bool mirrored, std::size_t f
   return lost;
 }
 
-void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& wanted, Scene& scene, Findings& findings) {
+void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& wanted, Scene& scene,
+                   Findings& findings) {
   const auto index = static_cast<std::uint32_t>(scene.parts.size());
   std::uint64_t lost = 0;
   for (const Affine& to_world : place.instances) {
@@ -122,10 +125,15 @@ void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& w
     lost += append_triangles(part, to_world.determinant() < 0, first, index, scene.mesh);
   }
   if (lost > 0) {
-    findings.warn("degenerate_triangles_dropped", std::to_string(lost) + " triangles have no area beside the size of the scene.", part.place);
+    findings.warn("degenerate_triangles_dropped",
+                  std::to_string(lost) + " triangles have no area beside the size of the scene.", part.place);
   }
-  scene.parts.push_back({.name = place.name, .material = part.material, .has_uv0 = !part.uv0.empty(),
-                         .has_uv1 = !part.uv1.empty(), .has_color = !part.color.empty(), .has_tangent = !part.tangent.empty()});
+  scene.parts.push_back({.name = place.name,
+                         .material = part.material,
+                         .has_uv0 = !part.uv0.empty(),
+                         .has_uv1 = !part.uv1.empty(),
+                         .has_color = !part.color.empty(),
+                         .has_tangent = !part.tangent.empty()});
 }
 
 /// Vertices that only vanished triangles used go; order stays.
@@ -177,19 +185,21 @@ void reserve(const std::vector<RawPart>& parts, const std::vector<PlacedPart>& p
 
 }  // namespace
 
-void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, const ImportLimits& limits, Findings& findings) {
+void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, const ImportLimits& limits,
+                         Findings& findings) {
   if (triangles > limits.max_triangles) {
     findings.fail("scene_too_large", "With its instances the scene has " + std::to_string(triangles) +
                                          " triangles, the limit is " + std::to_string(limits.max_triangles) + ".");
   } else if (mesh_bytes(vertices, triangles) > limits.max_memory_bytes ||
              vertices > std::numeric_limits<std::uint32_t>::max()) {
-    findings.fail("scene_too_large", "With its instances the scene takes " + std::to_string(mesh_bytes(vertices, triangles) >> 20) +
-                                         " MiB, the limit is " + std::to_string(limits.max_memory_bytes >> 20) + " MiB.");
+    findings.fail("scene_too_large", "With its instances the scene takes " +
+                                         std::to_string(mesh_bytes(vertices, triangles) >> 20) + " MiB, the limit is " +
+                                         std::to_string(limits.max_memory_bytes >> 20) + " MiB.");
   }
 }
 
-void assemble(const std::vector<RawPart>& parts, const std::vector<PlacedPart>& placed, const ImportLimits& limits, Scene& scene,
-              Findings& findings) {
+void assemble(const std::vector<RawPart>& parts, const std::vector<PlacedPart>& placed, const ImportLimits& limits,
+              Scene& scene, Findings& findings) {
   Wanted wanted;
   std::uint64_t vertices = 0, triangles = 0;
   for (const PlacedPart& place : placed) {

@@ -120,6 +120,7 @@ class PrimitiveBuilder {
 
  private:
   void add(NamedStream name, VertexStream stream) {
+    name.components = stream.components;
     out_.names.push_back(std::move(name));
     out_.mesh.streams.push_back(std::move(stream));
   }
@@ -152,19 +153,18 @@ std::vector<std::uint32_t> used_vertices(const Mesh& mesh) {
   return out;
 }
 
-std::vector<PartPrimitive> part_primitives(const BakedScene& baked, const SlotRanges& ranges,
-                                           std::span<const Vec3f> colors, const GeometryOptions& options) {
-  std::vector<PartPrimitive> out;
+Result<void> visit_part_primitives(const BakedScene& baked, const GeometryOptions& options, const PartVisitor& visit) {
+  const std::vector<Vec3f> colors = displayed_colors(baked);
   auto meshes = split_by_part(baked.scene);
   for (std::size_t part = 0; part < meshes.size(); ++part) {
     if (meshes[part].triangles.empty()) continue;
     PrimitiveBuilder builder(baked, static_cast<std::uint32_t>(part), std::move(meshes[part]));
     builder.add_geometry(options.encoding);
     builder.add_colors(colors);
-    if (options.coefficients) builder.add_coefficients(ranges, options.encoding.coefficient_bits);
-    out.push_back(builder.take());
+    if (options.ranges) builder.add_coefficients(*options.ranges, options.encoding.coefficient_bits);
+    if (auto done = visit(builder.take()); !done) return done;
   }
-  return out;
+  return {};
 }
 
 }  // namespace kiln

@@ -37,10 +37,12 @@ void drop_useless_triangles(RawPart& part, Findings& findings) {
   };
   std::erase_if(part.triangles, useless);
   if (degenerate > 0) {
-    findings.warn("degenerate_triangles_dropped", counted(degenerate, "triangle has", "triangles have") + " no area.", part.place);
+    findings.warn("degenerate_triangles_dropped", counted(degenerate, "triangle has", "triangles have") + " no area.",
+                  part.place);
   }
   if (duplicate > 0) {
-    findings.warn("duplicate_triangles_dropped", counted(duplicate, "triangle repeats", "triangles repeat") + " another one.", part.place);
+    findings.warn("duplicate_triangles_dropped",
+                  counted(duplicate, "triangle repeats", "triangles repeat") + " another one.", part.place);
   }
 }
 
@@ -61,7 +63,8 @@ void gather(RawPart& part, const std::vector<std::uint32_t>& from) {
   pick(part.tangent);
 }
 
-void drop_isolated_vertices(RawPart& part, Findings& findings) {
+/// Without a word: primitives may share one accessor and use a part of it each.
+void drop_isolated_vertices(RawPart& part) {
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> now(part.position.size(), kUnused);
   for (const Triangle& t : part.triangles) {
@@ -74,8 +77,6 @@ void drop_isolated_vertices(RawPart& part, Findings& findings) {
     kept.push_back(static_cast<std::uint32_t>(v));
   }
   if (kept.size() == now.size()) return;
-  findings.warn("isolated_vertices_dropped",
-                counted(now.size() - kept.size(), "vertex is", "vertices are") + " used by no triangle.", part.place);
   for (Triangle& t : part.triangles) {
     for (std::uint32_t& v : t) v = now[v];
   }
@@ -122,22 +123,41 @@ void make_smooth_normals(RawPart& part) {
   for (const Vec3d& d : directions) part.normal.push_back(to_float(normalized(d)));
 }
 
-/// Mirrors normals that lie behind the faces of their own vertex to the front: n - 2 (n.g) g.
-std::uint64_t mirror_hidden_normals(RawPart& part) {
+/// Where the faces around each vertex look on average; zero if they cancel.
+std::vector<Vec3d> facing(const RawPart& part) {
   std::vector<Vec3d> around(part.position.size());
   for (const Triangle& t : part.triangles) {
     const Vec3d area = face(part, t);
     for (const std::uint32_t v : t) around[v] += area;
   }
+  for (Vec3d& g : around) g = normalized(g, Vec3d{});
+  return around;
+}
+
+/// Normals and winding should agree. Where most do not, the winding is taken for the mistake, else the normal:
+/// it is mirrored to the front of its faces, n - 2 (n.g) g.
+void reconcile_normals(RawPart& part, Findings& findings) {
+  std::vector<Vec3d> front = facing(part);
+  const auto behind = [&](std::size_t v) { return dot(to_double(part.normal[v]), front[v]); };
+  std::uint64_t contradicting = 0;
+  for (std::size_t v = 0; v < front.size(); ++v) contradicting += behind(v) < 0 ? 1 : 0;
+  if (contradicting > front.size() / 2) {
+    for (Triangle& t : part.triangles) std::swap(t[1], t[2]);
+    for (Vec3d& g : front) g = -g;
+    findings.warn("winding_contradicts_normals", "Most faces are wound against their normals; all are turned round.",
+                  part.place);
+  }
   std::uint64_t mirrored = 0;
-  for (std::size_t v = 0; v < around.size(); ++v) {
-    const Vec3d g = normalized(around[v], Vec3d{}), n = to_double(part.normal[v]);
-    const double behind = dot(n, g);
-    if (behind >= 0) continue;
-    part.normal[v] = to_float(normalized(n - g * (2 * behind), g));
+  for (std::size_t v = 0; v < front.size(); ++v) {
+    if (behind(v) >= 0) continue;
+    part.normal[v] = to_float(normalized(to_double(part.normal[v]) - front[v] * (2 * behind(v)), front[v]));
     ++mirrored;
   }
-  return mirrored;
+  if (mirrored > 0) {
+    findings.warn("normals_contradict_faces",
+                  counted(mirrored, "normal lies", "normals lie") + " behind the face; mirrored to its front.",
+                  part.place);
+  }
 }
 
 void mend_normals(RawPart& part, Findings& findings) {
@@ -156,12 +176,13 @@ void mend_normals(RawPart& part, Findings& findings) {
     not_unit += std::abs(norm - 1) > kTolerance ? 1 : 0;
     part.normal[v] = to_float(n / norm);
   }
-  if (zero > 0) findings.warn("normals_computed", counted(zero, "normal has", "normals have") + " no direction; made from the faces.", part.place);
-  if (not_unit > 0) findings.warn("normals_not_unit", counted(not_unit, "normal is", "normals are") + " not of length 1; scaled.", part.place);
-  const std::uint64_t mirrored = mirror_hidden_normals(part);
-  if (mirrored > 0) {
-    findings.warn("normals_contradict_faces", counted(mirrored, "normal lies", "normals lie") + " behind the face; mirrored to its front.", part.place);
-  }
+  if (zero > 0)
+    findings.warn("normals_computed",
+                  counted(zero, "normal has", "normals have") + " no direction; made from the faces.", part.place);
+  if (not_unit > 0)
+    findings.warn("normals_not_unit", counted(not_unit, "normal is", "normals are") + " not of length 1; scaled.",
+                  part.place);
+  reconcile_normals(part, findings);
 }
 
 void mend_tangents(RawPart& part, Findings& findings) {
@@ -187,7 +208,7 @@ bool is_degenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
 
 void clean_part(RawPart& part, MissingNormals missing, Findings& findings) {
   drop_useless_triangles(part, findings);
-  drop_isolated_vertices(part, findings);
+  drop_isolated_vertices(part);
   if (!part.normal.empty()) {
     mend_normals(part, findings);
   } else if (missing == MissingNormals::flat) {

@@ -45,7 +45,7 @@ int add_stream(draco::Mesh& mesh, const VertexStream& stream, std::size_t vertic
   return id;
 }
 
-std::unique_ptr<draco::Mesh> draco_mesh(const DracoMesh& source) {
+std::unique_ptr<draco::Mesh> draco_mesh(DracoMesh& source) {
   auto mesh = std::make_unique<draco::Mesh>();
   const std::size_t vertices = source.streams[0].values.size() / 3;
   mesh->set_num_points(static_cast<std::uint32_t>(vertices));
@@ -55,7 +55,10 @@ std::unique_ptr<draco::Mesh> draco_mesh(const DracoMesh& source) {
     for (int c = 0; c < 3; ++c) face[c] = draco::PointIndex(source.triangles[f][static_cast<std::size_t>(c)]);
     mesh->SetFace(draco::FaceIndex(static_cast<std::uint32_t>(f)), face);
   }
-  for (const VertexStream& stream : source.streams) add_stream(*mesh, stream, vertices);
+  for (VertexStream& stream : source.streams) {
+    add_stream(*mesh, stream, vertices);
+    stream.values = {};
+  }
   return mesh;
 }
 
@@ -91,7 +94,7 @@ DecodedStream decoded_stream(const draco::PointAttribute& attribute, std::uint32
   return out;
 }
 
-Result<DecodedMesh> copy_out(const draco::Mesh& mesh) {
+Result<DecodedMesh> copy_out(const draco::Mesh& mesh, bool positions_only) {
   DecodedMesh out;
   out.vertices = mesh.num_points();
   out.triangles.resize(mesh.num_faces());
@@ -108,19 +111,20 @@ Result<DecodedMesh> copy_out(const draco::Mesh& mesh) {
     if (attribute.num_components() < 1 || attribute.num_components() > 4 || !attribute.buffer()) {
       return fault("draco_damaged", "An attribute has a number of components that no accessor can have.");
     }
+    if (positions_only && attribute.attribute_type() != draco::GeometryAttribute::POSITION) continue;
     out.streams[attribute.unique_id()] = decoded_stream(attribute, out.vertices);
   }
   return out;
 }
 
 /// Asked ahead, so that a damaged file cannot make the decoder ask for gigabytes.
-bool states_sizes_within(std::span<const std::uint8_t> bytes, const DracoLimits& limits) {
+bool states_sizes_within(std::span<const std::uint8_t> bytes, const DracoDecode& options) {
   const auto header = read_draco_header(bytes);
-  return header && header->vertices <= limits.max_vertices && header->faces <= limits.max_triangles;
+  return header && header->vertices <= options.max_vertices && header->faces <= options.max_triangles;
 }
 
-Result<DecodedMesh> decode_checked(std::span<const std::uint8_t> bytes, const DracoLimits& limits) {
-  if (!states_sizes_within(bytes, limits)) {
+Result<DecodedMesh> decode_checked(std::span<const std::uint8_t> bytes, const DracoDecode& options) {
+  if (!states_sizes_within(bytes, options)) {
     return fault("draco_damaged", "The compressed geometry is larger than its accessors say.");
   }
   draco::DecoderBuffer buffer;
@@ -128,15 +132,15 @@ Result<DecodedMesh> decode_checked(std::span<const std::uint8_t> bytes, const Dr
   draco::Decoder decoder;
   auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
   if (!mesh.ok()) return fault("draco_damaged", "The compressed geometry cannot be decoded.");
-  if (mesh.value()->num_points() > limits.max_vertices || mesh.value()->num_faces() > limits.max_triangles) {
+  if (mesh.value()->num_points() > options.max_vertices || mesh.value()->num_faces() > options.max_triangles) {
     return fault("draco_damaged", "The compressed geometry is larger than its accessors say.");
   }
-  return copy_out(*mesh.value());
+  return copy_out(*mesh.value(), options.positions_only);
 }
 
 }  // namespace
 
-Result<Bytes> encode_draco(const DracoMesh& source, int speed) {
+Result<Bytes> encode_draco(DracoMesh source, int speed) {
   EXPECTS(!source.triangles.empty() && !source.streams.empty() && source.streams[0].kind == StreamKind::position);
   const auto mesh = draco_mesh(source);
   Bytes out;
@@ -145,8 +149,8 @@ Result<Bytes> encode_draco(const DracoMesh& source, int speed) {
   return fault("draco_refused", "The geometry of a part cannot be compressed.");
 }
 
-Result<DecodedMesh> decode_draco(std::span<const std::uint8_t> bytes, const DracoLimits& limits) try {
-  return decode_checked(bytes, limits);
+Result<DecodedMesh> decode_draco(std::span<const std::uint8_t> bytes, const DracoDecode& options) try {
+  return decode_checked(bytes, options);
 } catch (const std::bad_alloc&) {
   return fault("draco_damaged", "The compressed geometry asks for more memory than there is.");
 } catch (const std::length_error&) {

@@ -46,9 +46,12 @@ Result<Environment> read_pixels(Span file, const std::string& name) {
   MemoryStream stream(file);
   Imf::InputFile input(stream, 1);
   const Imath::Box2i window = input.header().dataWindow();
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1, height = std::int64_t{window.max.y} - window.min.y + 1;
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
+                     height = std::int64_t{window.max.y} - window.min.y + 1;
   if (width < 1 || height < 1 || width > kMaxEnvironmentWidth || height > kMaxEnvironmentHeight) {
-    return fault("image_too_large", std::to_string(width) + " x " + std::to_string(height) + " pixels; an environment may have 8192 x 4096.", name);
+    return fault(
+        "image_too_large",
+        std::to_string(width) + " x " + std::to_string(height) + " pixels; an environment may have 8192 x 4096.", name);
   }
   for (const char* channel : {"R", "G", "B"}) {
     const Imf::Channel* found = input.header().channels().findChannel(channel);
@@ -63,7 +66,8 @@ Result<Environment> read_pixels(Span file, const std::string& name) {
   Imf::FrameBuffer frame;
   const char* names[] = {"R", "G", "B"};
   for (std::size_t c = 0; c < 3; ++c) {
-    frame.insert(names[c], Imf::Slice(Imf::FLOAT, base + c * sizeof(float), sizeof(Vec3f), static_cast<std::size_t>(width) * sizeof(Vec3f)));
+    frame.insert(names[c], Imf::Slice(Imf::FLOAT, base + c * sizeof(float), sizeof(Vec3f),
+                                      static_cast<std::size_t>(width) * sizeof(Vec3f)));
   }
   input.setFrameBuffer(frame);
   input.readPixels(window.min.y, window.max.y);

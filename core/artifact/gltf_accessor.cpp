@@ -29,21 +29,26 @@ float load_float(const std::uint8_t* at, Component c, bool normalized) {
       const auto x = static_cast<float>(load<std::int8_t>(at));
       return normalized ? std::max(x / 127.0F, -1.0F) : x;
     }
-    case Component::u8: return static_cast<float>(*at) / (normalized ? 255.0F : 1.0F);
+    case Component::u8:
+      return static_cast<float>(*at) / (normalized ? 255.0F : 1.0F);
     case Component::i16: {
       const auto x = static_cast<float>(load<std::int16_t>(at));
       return normalized ? std::max(x / 32767.0F, -1.0F) : x;
     }
-    case Component::u16: return static_cast<float>(load<std::uint16_t>(at)) / (normalized ? 65535.0F : 1.0F);
-    case Component::u32: return static_cast<float>(load<std::uint32_t>(at));
-    case Component::f32: return load<float>(at);
+    case Component::u16:
+      return static_cast<float>(load<std::uint16_t>(at)) / (normalized ? 65535.0F : 1.0F);
+    case Component::u32:
+      return static_cast<float>(load<std::uint32_t>(at));
+    case Component::f32:
+      return load<float>(at);
   }
   return 0;
 }
 
 /// Calls put(element, component, bytes) for all that the views hold, then for the sparse replacements.
 template <class Put>
-void for_each_component(const AccessorSource& source, const Accessor& a, const std::string& place, Findings& findings, const Put& put) {
+void for_each_component(const AccessorSource& source, const Accessor& a, const std::string& place, Findings& findings,
+                        const Put& put) {
   const std::uint64_t size = component_bytes(a.component);
   const auto element = [&](std::uint64_t i, const std::uint8_t* at) {
     for (std::uint64_t c = 0; c < a.width; ++c) put(i, c, at + c * size);
@@ -67,11 +72,14 @@ void for_each_component(const AccessorSource& source, const Accessor& a, const s
   }
 }
 
-const Accessor& at(const AccessorSource& source, int i) { return source.document.accessors[static_cast<std::size_t>(i)]; }
+const Accessor& at(const AccessorSource& source, int i) {
+  return source.document.accessors[static_cast<std::size_t>(i)];
+}
 
 }  // namespace
 
-std::vector<float> read_floats(const AccessorSource& source, int accessor, const std::string& place, Findings& findings) {
+std::vector<float> read_floats(const AccessorSource& source, int accessor, const std::string& place,
+                               Findings& findings) {
   const Accessor& a = at(source, accessor);
   if (a.matrix) {
     findings.fail("accessor_type", "Matrices are not expected here.", place);
@@ -90,7 +98,8 @@ std::vector<float> read_floats(const AccessorSource& source, int accessor, const
   return out;
 }
 
-std::vector<std::uint32_t> read_indices(const AccessorSource& source, int accessor, const std::string& place, Findings& findings) {
+std::vector<std::uint32_t> read_indices(const AccessorSource& source, int accessor, const std::string& place,
+                                        Findings& findings) {
   const Accessor& a = at(source, accessor);
   std::vector<std::uint32_t> out(a.count);
   for_each_component(source, a, place, findings, [&](std::uint64_t i, std::uint64_t, const std::uint8_t* bytes) {

@@ -7,15 +7,18 @@ namespace {
 
 std::string place_of(const char* array, std::size_t i) { return std::string("/") + array + "/" + std::to_string(i); }
 
-bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t size) { return offset <= size && bytes <= size - offset; }
+bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t size) {
+  return offset <= size && bytes <= size - offset;
+}
 
 std::string range_text(std::uint64_t offset, std::uint64_t bytes, std::uint64_t size) {
-  return "Bytes " + std::to_string(offset) + " + " + std::to_string(bytes) + " pass the end at " + std::to_string(size) + ".";
+  return "Bytes " + std::to_string(offset) + " + " + std::to_string(bytes) + " pass the end at " +
+         std::to_string(size) + ".";
 }
 
 /// What the buffer may use: the BIN chunk for the first without a URI, else what the URI names.
-std::optional<Span> source_of(const Buffer& buffer, std::size_t i, const GltfContainer& container, const SceneFiles& files,
-                              BufferBytes& out, Findings& findings) {
+std::optional<Span> source_of(const Buffer& buffer, std::size_t i, const GltfContainer& container,
+                              const SceneFiles& files, BufferBytes& out, Findings& findings) {
   if (buffer.has_uri) return resolve_uri(buffer.uri, files, out.owned, place_of("buffers", i) + "/uri", findings);
   if (i == 0 && container.has_binary) return container.binary;
   if (buffer.fallback) return Span{};
@@ -30,14 +33,16 @@ void load_buffer(const Buffer& buffer, std::size_t i, const GltfContainer& conta
   const bool absent = buffer.fallback && source->empty();
   if (!absent && source->size() < buffer.bytes) {
     findings.fail("buffer_too_short",
-                  "The buffer has " + std::to_string(source->size()) + " bytes, " + std::to_string(buffer.bytes) + " are declared.",
+                  "The buffer has " + std::to_string(source->size()) + " bytes, " + std::to_string(buffer.bytes) +
+                      " are declared.",
                   place_of("buffers", i) + "/byteLength");
     return;
   }
   out.buffers.push_back(absent ? Span{} : source->first(buffer.bytes));
 }
 
-Span load_compressed(const Meshopt& m, std::uint64_t view_bytes, const std::string& place, BufferBytes& out, Findings& findings) {
+Span load_compressed(const Meshopt& m, std::uint64_t view_bytes, const std::string& place, BufferBytes& out,
+                     Findings& findings) {
   const Span buffer = out.buffers[static_cast<std::size_t>(m.buffer)];
   if (!inside(m.offset, m.bytes, buffer.size())) {
     findings.fail("view_out_of_bounds", range_text(m.offset, m.bytes, buffer.size()), place);
@@ -107,7 +112,8 @@ BufferBytes load_bytes(const Document& document, const GltfContainer& container,
   for (std::size_t i = 0; i < document.views.size() && !findings.failed(); ++i) {
     if (document.views[i].meshopt.mode != MeshoptMode::none) decoded += document.views[i].bytes;
     if (decoded > limits.max_memory_bytes / 2) {
-      findings.fail("scene_too_large", "Decompressed buffers would take more than half of the memory limit.", place_of("bufferViews", i));
+      findings.fail("scene_too_large", "Decompressed buffers would take more than half of the memory limit.",
+                    place_of("bufferViews", i));
     } else {
       load_view(document.views[i], i, document, out, findings);
     }

@@ -29,7 +29,8 @@ void check_sparse(const Document& d, const Accessor& a, std::size_t i, Findings&
   const std::string place = accessor_place(i) + "/sparse";
   const std::uint64_t index_bytes = component_bytes(s.index_component);
   check_range(d, s.index_view, s.index_offset, index_bytes, s.count, index_bytes, place + "/indices", findings);
-  check_range(d, s.value_view, s.value_offset, a.element_bytes(), s.count, a.element_bytes(), place + "/values", findings);
+  check_range(d, s.value_view, s.value_offset, a.element_bytes(), s.count, a.element_bytes(), place + "/values",
+              findings);
 }
 
 void check_accessor(const Document& d, std::size_t i, Findings& findings) {
@@ -42,7 +43,8 @@ void check_accessor(const Document& d, std::size_t i, Findings& findings) {
     return;
   }
   if (stride % component_bytes(a.component) != 0 || a.offset % component_bytes(a.component) != 0) {
-    findings.warn("accessor_unaligned", "Elements do not start at multiples of their component size.", accessor_place(i));
+    findings.warn("accessor_unaligned", "Elements do not start at multiples of their component size.",
+                  accessor_place(i));
   }
   if (!a.matrix) check_range(d, a.view, a.offset, stride, a.count, a.element_bytes(), accessor_place(i), findings);
 }
@@ -60,7 +62,8 @@ void check_primitive(const Document& d, const Primitive& p, const std::string& p
     }
     const bool has_bytes = a.view >= 0 || p.draco.view >= 0;
     if (!has_bytes && a.count > kMaxZeroElements) {
-      findings.fail("accessor_without_data", "An accessor of " + std::to_string(a.count) + " elements has no buffer view.",
+      findings.fail("accessor_without_data",
+                    "An accessor of " + std::to_string(a.count) + " elements has no buffer view.",
                     place + "/attributes/" + name);
     }
   }
@@ -71,7 +74,8 @@ void check_primitive(const Document& d, const Primitive& p, const std::string& p
   if (!is_unsigned || indices.width != 1) {
     findings.fail("accessor_type", "Indices must be unsigned scalars.", place + "/indices");
   } else if (indices.view < 0 && p.draco.view < 0 && indices.count > kMaxZeroElements) {
-    findings.fail("accessor_without_data", "An accessor of " + std::to_string(indices.count) + " elements has no buffer view.",
+    findings.fail("accessor_without_data",
+                  "An accessor of " + std::to_string(indices.count) + " elements has no buffer view.",
                   place + "/indices");
   }
 }
@@ -87,7 +91,8 @@ void check_forest(const Document& d, Findings& findings) {
         return findings.fail("node_cycle", "A node is its own child.", "/nodes/" + std::to_string(i));
       }
       if (p >= 0) {
-        return findings.fail("node_multiple_parents", "A node is listed as a child twice.", "/nodes/" + std::to_string(child));
+        return findings.fail("node_multiple_parents", "A node is listed as a child twice.",
+                             "/nodes/" + std::to_string(child));
       }
       p = static_cast<int>(i);
     }
@@ -123,8 +128,8 @@ void check_document(const Document& d, Findings& findings) {
   for (std::size_t i = 0; i < d.accessors.size() && !findings.failed(); ++i) check_accessor(d, i, findings);
   for (std::size_t m = 0; m < d.meshes.size() && !findings.failed(); ++m) {
     for (std::size_t p = 0; p < d.meshes[m].primitives.size(); ++p) {
-      check_primitive(d, d.meshes[m].primitives[p],
-                      "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p), findings);
+      check_primitive(d, d.meshes[m].primitives[p], "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p),
+                      findings);
     }
   }
   if (!findings.failed()) check_forest(d, findings);

@@ -26,7 +26,8 @@ bool check_header(Span file, Findings& findings) {
   if (file.size() < kHeaderBytes) {
     findings.fail("glb_truncated", "The GLB header is cut off.", byte_place(file.size()));
   } else if (read_u32(file, 4) != 2) {
-    findings.fail("unsupported_version", "GLB version " + std::to_string(read_u32(file, 4)) + " is not 2.", byte_place(4));
+    findings.fail("unsupported_version", "GLB version " + std::to_string(read_u32(file, 4)) + " is not 2.",
+                  byte_place(4));
   } else if (read_u32(file, 8) != file.size()) {
     findings.fail("glb_length_mismatch",
                   "The header says " + std::to_string(read_u32(file, 8)) + " bytes, the file has " +
@@ -37,7 +38,8 @@ bool check_header(Span file, Findings& findings) {
 }
 
 /// Takes chunk number `index`, of `type`, into the container.
-void take_chunk(GltfContainer& container, std::size_t index, std::uint32_t type, Span data, std::size_t at, Findings& findings) {
+void take_chunk(GltfContainer& container, std::size_t index, std::uint32_t type, Span data, std::size_t at,
+                Findings& findings) {
   if (index == 0 && type != kJsonChunk) {
     findings.fail("glb_chunk_order", "The first chunk must be JSON.", byte_place(at));
   } else if (index > 0 && type == kJsonChunk) {
@@ -92,7 +94,8 @@ GltfContainer open_glb(Span file, Findings& findings) {
 
 GltfContainer open_gltf(Span file, Findings& findings) {
   const Span json = without_mark(file);
-  if (json.size() != file.size()) findings.warn("json_byte_order_mark", "glTF forbids a byte-order mark; it is skipped.");
+  if (json.size() != file.size())
+    findings.warn("json_byte_order_mark", "glTF forbids a byte-order mark; it is skipped.");
   return {.json = json};
 }
 

@@ -11,9 +11,13 @@ namespace {
 /// The densest real streams (flat regular grids) hold a few hundred faces in a byte.
 constexpr std::uint64_t kMaxFacesPerByte = 2048;
 
-Span stream_of(const AccessorSource& source, const Primitive& p) { return source.bytes.views[static_cast<std::size_t>(p.draco.view)]; }
+Span stream_of(const AccessorSource& source, const Primitive& p) {
+  return source.bytes.views[static_cast<std::size_t>(p.draco.view)];
+}
 
-const Accessor& accessor(const AccessorSource& source, int i) { return source.document.accessors[static_cast<std::size_t>(i)]; }
+const Accessor& accessor(const AccessorSource& source, int i) {
+  return source.document.accessors[static_cast<std::size_t>(i)];
+}
 
 std::string mismatch(const char* what, std::uint64_t stream, std::uint64_t accessors) {
   return "The stream has " + std::to_string(stream) + " " + what + ", the accessors " + std::to_string(accessors) + ".";
@@ -52,11 +56,16 @@ std::unique_ptr<draco::Mesh> decode(Span stream) {
 float normalization(const Accessor& a, const draco::PointAttribute& attribute) {
   if (!a.normalized || attribute.normalized()) return 1;
   switch (a.component) {
-    case Component::i8: return 1 / 127.0F;
-    case Component::u8: return 1 / 255.0F;
-    case Component::i16: return 1 / 32767.0F;
-    case Component::u16: return 1 / 65535.0F;
-    default: return 1;
+    case Component::i8:
+      return 1 / 127.0F;
+    case Component::u8:
+      return 1 / 255.0F;
+    case Component::i16:
+      return 1 / 32767.0F;
+    case Component::u16:
+      return 1 / 65535.0F;
+    default:
+      return 1;
   }
 }
 
@@ -72,8 +81,8 @@ std::vector<float> floats_of(const draco::Mesh& mesh, const draco::PointAttribut
   return out;
 }
 
-void take_attribute(const AccessorSource& source, const draco::Mesh& mesh, const std::string& name, int index, RawPart& part,
-                    const Primitive& p, Findings& findings) {
+void take_attribute(const AccessorSource& source, const draco::Mesh& mesh, const std::string& name, int index,
+                    RawPart& part, const Primitive& p, Findings& findings) {
   const std::string place = part.place + "/attributes/" + name;
   const auto* attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(p.draco.attributes.at(name)));
   const Accessor& a = accessor(source, index);
@@ -83,7 +92,8 @@ void take_attribute(const AccessorSource& source, const draco::Mesh& mesh, const
   const auto values = floats_of(mesh, *attribute, a);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::isfinite(values[i])) continue;
-    return findings.fail("non_finite_geometry", "A value is not finite.", place + " element " + std::to_string(i / a.width));
+    return findings.fail("non_finite_geometry", "A value is not finite.",
+                         place + " element " + std::to_string(i / a.width));
   }
   set_attribute(part, name, values, a.width, place, findings);
 }

@@ -43,8 +43,9 @@ std::optional<ImageHeader> checked_header(Span encoded, std::uint64_t& pixels, c
   pixels += area;
   if (area > limits.max_image_pixels || pixels > limits.max_total_pixels) {
     findings.fail("image_too_large",
-                  std::to_string(header->width) + " x " + std::to_string(header->height) + " pixels; an image may have " +
-                      std::to_string(limits.max_image_pixels) + ", all together " + std::to_string(limits.max_total_pixels) + ".",
+                  std::to_string(header->width) + " x " + std::to_string(header->height) +
+                      " pixels; an image may have " + std::to_string(limits.max_image_pixels) + ", all together " +
+                      std::to_string(limits.max_total_pixels) + ".",
                   place);
     return std::nullopt;
   }
@@ -63,8 +64,8 @@ void decode_into(Image& image, const ImageHeader& header, const std::string& pla
 
 }  // namespace
 
-std::vector<Image> load_images(const Document& d, const BufferBytes& bytes, const SceneFiles& files, const ImportLimits& limits,
-                               Findings& findings) {
+std::vector<Image> load_images(const Document& d, const BufferBytes& bytes, const SceneFiles& files,
+                               const ImportLimits& limits, Findings& findings) {
   const std::vector<bool> needed = needed_images(d);
   std::vector<Image> out;
   std::uint64_t pixels = 0;
@@ -75,8 +76,12 @@ std::vector<Image> load_images(const Document& d, const BufferBytes& bytes, cons
     if (!encoded) break;
     const auto header = checked_header(*encoded, pixels, limits, place, findings);
     if (!header) break;
-    Image image{.name = d.images[i].name, .mime = header->mime, .encoded = Bytes(encoded->begin(), encoded->end()),
-                .width = static_cast<int>(header->width), .height = static_cast<int>(header->height), .rgba = {}};
+    Image image{.name = d.images[i].name,
+                .mime = header->mime,
+                .encoded = Bytes(encoded->begin(), encoded->end()),
+                .width = static_cast<int>(header->width),
+                .height = static_cast<int>(header->height),
+                .rgba = {}};
     if (needed[i]) decode_into(image, *header, place, findings);
     out.push_back(std::move(image));
   }

@@ -29,16 +29,21 @@ int decode(const Meshopt& m, Span encoded, Bytes& out) {
       return meshopt_decodeIndexBuffer(out.data(), m.count, m.stride, encoded.data(), encoded.size());
     case MeshoptMode::indices:
       return meshopt_decodeIndexSequence(out.data(), m.count, m.stride, encoded.data(), encoded.size());
-    default: return meshopt_decodeVertexBuffer(out.data(), m.count, m.stride, encoded.data(), encoded.size());
+    default:
+      return meshopt_decodeVertexBuffer(out.data(), m.count, m.stride, encoded.data(), encoded.size());
   }
 }
 
 void apply_filter(const Meshopt& m, Bytes& out) {
   switch (m.filter) {
-    case MeshoptFilter::octahedral: return meshopt_decodeFilterOct(out.data(), m.count, m.stride);
-    case MeshoptFilter::quaternion: return meshopt_decodeFilterQuat(out.data(), m.count, m.stride);
-    case MeshoptFilter::exponential: return meshopt_decodeFilterExp(out.data(), m.count, m.stride);
-    case MeshoptFilter::none: return;
+    case MeshoptFilter::octahedral:
+      return meshopt_decodeFilterOct(out.data(), m.count, m.stride);
+    case MeshoptFilter::quaternion:
+      return meshopt_decodeFilterQuat(out.data(), m.count, m.stride);
+    case MeshoptFilter::exponential:
+      return meshopt_decodeFilterExp(out.data(), m.count, m.stride);
+    case MeshoptFilter::none:
+      return;
   }
 }
 

@@ -19,9 +19,15 @@ void check_version(const Fields& root) {
 }
 
 Sizes sizes_of(const Fields& root) {
-  Sizes s{.buffers = root.size("buffers"), .views = root.size("bufferViews"), .accessors = root.size("accessors"),
-          .meshes = root.size("meshes"), .nodes = root.size("nodes"), .images = root.size("images"),
-          .samplers = root.size("samplers"), .textures = root.size("textures"), .materials = root.size("materials"),
+  Sizes s{.buffers = root.size("buffers"),
+          .views = root.size("bufferViews"),
+          .accessors = root.size("accessors"),
+          .meshes = root.size("meshes"),
+          .nodes = root.size("nodes"),
+          .images = root.size("images"),
+          .samplers = root.size("samplers"),
+          .textures = root.size("textures"),
+          .materials = root.size("materials"),
           .skins = root.size("skins")};
   if (root.has_extension("KHR_lights_punctual")) s.lights = root.extension("KHR_lights_punctual").size("lights");
   return s;

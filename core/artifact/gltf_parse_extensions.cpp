@@ -8,9 +8,9 @@ namespace kiln::gltf {
 namespace {
 
 constexpr std::array<std::string_view, 9> kHonoured{
-    "KHR_draco_mesh_compression", "EXT_meshopt_compression",         "KHR_mesh_quantization",
-    "KHR_texture_transform",      "KHR_lights_punctual",             "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",         "KHR_materials_pbrSpecularGlossiness"};
+    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization",
+    "KHR_texture_transform",      "KHR_lights_punctual",     "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing", "KHR_materials_pbrSpecularGlossiness"};
 
 /// Without effect on diffuse light, so not worth a word.
 constexpr std::array<std::string_view, 4> kHarmless{"KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_materials_ior",
@@ -24,8 +24,8 @@ bool contains(const auto& names, const std::string& name) {
 std::string printable(const std::string& name) {
   std::string out = name.substr(0, 80);
   std::replace_if(
-      out.begin(), out.end(), [](char c) { return !(('0' <= c && c <= '9') || ('A' <= c && c <= 'Z') || ('a' <= c && c <= 'z')); },
-      '_');
+      out.begin(), out.end(),
+      [](char c) { return !(('0' <= c && c <= '9') || ('A' <= c && c <= 'Z') || ('a' <= c && c <= 'z')); }, '_');
   return out;
 }
 
@@ -44,7 +44,8 @@ void check_extensions(const Fields& root, Document& document) {
   for (const std::string& name : root.texts("extensionsUsed")) {
     if (name == "KHR_mesh_quantization") document.declares_quantization = true;
     if (name == "KHR_materials_pbrSpecularGlossiness") {
-      findings.warn("specular_glossiness_as_diffuse", "Specular-glossiness materials are baked by their diffuse colour.");
+      findings.warn("specular_glossiness_as_diffuse",
+                    "Specular-glossiness materials are baked by their diffuse colour.");
     }
     if (!contains(kHonoured, name) && !contains(kHarmless, name)) {
       findings.warn("extension_ignored", "The file uses " + printable(name) + ", which has no effect on the bake.");

@@ -11,7 +11,8 @@ void fail(const Fields& f, const char* key, const char* code, const std::string&
 }
 
 void require(const Fields& f, const char* key) {
-  if (!f.has(key)) f.findings().fail("property_missing", std::string("The property \"") + key + "\" is required.", f.pointer());
+  if (!f.has(key))
+    f.findings().fail("property_missing", std::string("The property \"") + key + "\" is required.", f.pointer());
 }
 
 Meshopt parse_meshopt(const Fields& f, const Sizes& sizes) {
@@ -49,8 +50,13 @@ void parse_type(const Fields& f, Accessor& a) {
   require(f, "type");
   const std::string type = f.text("type");
   a.matrix = type.substr(0, 3) == "MAT";
-  a.width = type == "SCALAR" ? 1 : type == "VEC2" ? 2 : type == "VEC3" ? 3 : type == "VEC4" || type == "MAT2" ? 4
-            : type == "MAT3" ? 9 : type == "MAT4" ? 16 : 0;
+  a.width = type == "SCALAR"                   ? 1
+            : type == "VEC2"                   ? 2
+            : type == "VEC3"                   ? 3
+            : type == "VEC4" || type == "MAT2" ? 4
+            : type == "MAT3"                   ? 9
+            : type == "MAT4"                   ? 16
+                                               : 0;
   if (a.width == 0) fail(f, "type", "unknown_enum", "The accessor type is not known.");
 }
 
@@ -67,7 +73,8 @@ Sparse parse_sparse(const Fields& f, const Sizes& sizes) {
   s.index_component = parse_component(indices, "componentType");
   s.value_view = values.index("bufferView", sizes.views);
   s.value_offset = values.count("byteOffset", 0);
-  const bool is_index = s.index_component == Component::u8 || s.index_component == Component::u16 || s.index_component == Component::u32;
+  const bool is_index =
+      s.index_component == Component::u8 || s.index_component == Component::u16 || s.index_component == Component::u32;
   if (!is_index) fail(indices, "componentType", "accessor_type", "Sparse indices must be unsigned integers.");
   return s;
 }
@@ -99,7 +106,8 @@ Primitive parse_primitive(const Fields& f, const Sizes& sizes) {
   f.for_each("targets", [&](const Fields& target) {
     if (target.has("POSITION")) target.index("POSITION", sizes.accessors);
   });
-  if (f.has_extension("KHR_draco_mesh_compression")) p.draco = parse_draco(f.extension("KHR_draco_mesh_compression"), sizes);
+  if (f.has_extension("KHR_draco_mesh_compression"))
+    p.draco = parse_draco(f.extension("KHR_draco_mesh_compression"), sizes);
   return p;
 }
 
@@ -110,16 +118,29 @@ std::array<double, 16> parse_transform(const Fields& f) {
   auto q = f.numbers<4>("rotation", {0, 0, 0, 1});
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(norm > 0) || !std::isfinite(norm)) {
-    f.findings().warn("node_rotation_invalid", "A rotation without a direction is taken as none.", f.pointer("rotation"));
+    f.findings().warn("node_rotation_invalid", "A rotation without a direction is taken as none.",
+                      f.pointer("rotation"));
     q = {0, 0, 0, 1};
   } else {
     for (double& x : q) x /= norm;
   }
   const double x = q[0], y = q[1], z = q[2], w = q[3];
-  return {s[0] * (1 - 2 * (y * y + z * z)), s[0] * 2 * (x * y + z * w), s[0] * 2 * (x * z - y * w), 0,
-          s[1] * 2 * (x * y - z * w), s[1] * (1 - 2 * (x * x + z * z)), s[1] * 2 * (y * z + x * w), 0,
-          s[2] * 2 * (x * z + y * w), s[2] * 2 * (y * z - x * w), s[2] * (1 - 2 * (x * x + y * y)), 0,
-          t[0], t[1], t[2], 1};
+  return {s[0] * (1 - 2 * (y * y + z * z)),
+          s[0] * 2 * (x * y + z * w),
+          s[0] * 2 * (x * z - y * w),
+          0,
+          s[1] * 2 * (x * y - z * w),
+          s[1] * (1 - 2 * (x * x + z * z)),
+          s[1] * 2 * (y * z + x * w),
+          0,
+          s[2] * 2 * (x * z + y * w),
+          s[2] * 2 * (y * z - x * w),
+          s[2] * (1 - 2 * (x * x + y * y)),
+          0,
+          t[0],
+          t[1],
+          t[2],
+          1};
 }
 
 }  // namespace
@@ -131,17 +152,21 @@ std::uint64_t component_bytes(Component c) {
 Buffer parse_buffer(const Fields& f) {
   require(f, "byteLength");
   Buffer b{.bytes = f.count("byteLength", 0), .uri = f.text("uri"), .has_uri = f.has("uri")};
-  if (f.has_extension("EXT_meshopt_compression")) b.fallback = f.extension("EXT_meshopt_compression").flag("fallback", false);
+  if (f.has_extension("EXT_meshopt_compression"))
+    b.fallback = f.extension("EXT_meshopt_compression").flag("fallback", false);
   return b;
 }
 
 BufferView parse_view(const Fields& f, const Sizes& sizes) {
   require(f, "buffer");
   require(f, "byteLength");
-  BufferView v{.buffer = f.index("buffer", sizes.buffers), .offset = f.count("byteOffset", 0),
-               .bytes = f.count("byteLength", 0), .stride = f.count("byteStride", 0)};
+  BufferView v{.buffer = f.index("buffer", sizes.buffers),
+               .offset = f.count("byteOffset", 0),
+               .bytes = f.count("byteLength", 0),
+               .stride = f.count("byteStride", 0)};
   if (v.stride > 252) fail(f, "byteStride", "view_stride", "A stride of " + std::to_string(v.stride) + " is over 252.");
-  if (f.has_extension("EXT_meshopt_compression")) v.meshopt = parse_meshopt(f.extension("EXT_meshopt_compression"), sizes);
+  if (f.has_extension("EXT_meshopt_compression"))
+    v.meshopt = parse_meshopt(f.extension("EXT_meshopt_compression"), sizes);
   return v;
 }
 
@@ -160,7 +185,8 @@ Accessor parse_accessor(const Fields& f, const Sizes& sizes) {
   if (f.has("sparse")) a.sparse = parse_sparse(f.object("sparse"), sizes);
   if (a.sparse.count > a.count) {
     fail(f, "sparse", "accessor_sparse_count",
-         "More elements are replaced, " + std::to_string(a.sparse.count) + ", than the accessor has, " + std::to_string(a.count) + ".");
+         "More elements are replaced, " + std::to_string(a.sparse.count) + ", than the accessor has, " +
+             std::to_string(a.count) + ".");
   }
   a.min = parse_bounds(f, "min");
   a.max = parse_bounds(f, "max");

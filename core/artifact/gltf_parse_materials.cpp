@@ -27,7 +27,8 @@ void parse_transform(const Fields& f, TextureRef& ref) {
   const auto offset = reals<2>(f, "offset", {0, 0}), scale = reals<2>(f, "scale", {1, 1});
   const float angle = real(f, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
   ref.transform = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
-  ref.uv_set = static_cast<int>(std::min<std::uint64_t>(f.count("texCoord", static_cast<std::uint64_t>(ref.uv_set)), 1000));
+  ref.uv_set =
+      static_cast<int>(std::min<std::uint64_t>(f.count("texCoord", static_cast<std::uint64_t>(ref.uv_set)), 1000));
 }
 
 TextureRef parse_texture_ref(const Fields& f, const char* key, const Sizes& sizes) {
@@ -39,7 +40,8 @@ TextureRef parse_texture_ref(const Fields& f, const char* key, const Sizes& size
   ref.scale = real(info, "scale", 1);
   if (info.has_extension("KHR_texture_transform")) parse_transform(info.extension("KHR_texture_transform"), ref);
   if (ref.uv_set > 1) {
-    f.findings().warn("texture_uv_set_ignored", "Only TEXCOORD_0 and TEXCOORD_1 are read; the texture is left out.", info.pointer());
+    f.findings().warn("texture_uv_set_ignored", "Only TEXCOORD_0 and TEXCOORD_1 are read; the texture is left out.",
+                      info.pointer());
     ref.texture = -1;
     ref.uv_set = 0;
   }
@@ -68,16 +70,22 @@ AlphaMode parse_alpha_mode(const Fields& f) {
   const std::string mode = f.text("alphaMode");
   if (mode == "MASK") return AlphaMode::mask;
   if (mode == "BLEND") return AlphaMode::blend;
-  if (!mode.empty() && mode != "OPAQUE") f.findings().fail("unknown_enum", "The alpha mode is not known.", f.pointer("alphaMode"));
+  if (!mode.empty() && mode != "OPAQUE")
+    f.findings().fail("unknown_enum", "The alpha mode is not known.", f.pointer("alphaMode"));
   return AlphaMode::opaque;
 }
 
 Wrap parse_wrap(const Fields& f, const char* key) {
   switch (f.count(key, 10497)) {
-    case 10497: return Wrap::repeat;
-    case 33071: return Wrap::clamp;
-    case 33648: return Wrap::mirror;
-    default: f.findings().fail("unknown_enum", "The wrap mode is not known.", f.pointer(key)); return Wrap::repeat;
+    case 10497:
+      return Wrap::repeat;
+    case 33071:
+      return Wrap::clamp;
+    case 33648:
+      return Wrap::mirror;
+    default:
+      f.findings().fail("unknown_enum", "The wrap mode is not known.", f.pointer(key));
+      return Wrap::repeat;
   }
 }
 
@@ -86,7 +94,8 @@ int parse_source(const Fields& f, const Sizes& sizes) {
   if (f.has("source")) return f.index("source", sizes.images);
   for (const char* name : {"KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds"}) {
     if (!f.has_extension(name)) continue;
-    f.findings().warn("texture_not_decoded", std::string("A texture has only the form of ") + name + "; it is baked as white.", f.pointer());
+    f.findings().warn("texture_not_decoded",
+                      std::string("A texture has only the form of ") + name + "; it is baked as white.", f.pointer());
     return f.extension(name).index("source", sizes.images);
   }
   return -1;
@@ -101,7 +110,10 @@ float real(const Fields& f, const char* key, double absent) {
 }
 
 ImageSource parse_image(const Fields& f, const Sizes& sizes) {
-  ImageSource image{.name = f.text("name"), .uri = f.text("uri"), .mime = f.text("mimeType"), .has_uri = f.has("uri"),
+  ImageSource image{.name = f.text("name"),
+                    .uri = f.text("uri"),
+                    .mime = f.text("mimeType"),
+                    .has_uri = f.has("uri"),
                     .view = f.index("bufferView", sizes.views)};
   if (image.has_uri == (image.view >= 0)) {
     f.findings().fail("image_source", "An image must have either a uri or a bufferView.", f.pointer());
@@ -112,7 +124,8 @@ ImageSource parse_image(const Fields& f, const Sizes& sizes) {
 std::vector<Texture> parse_textures(const Fields& root, const Sizes& sizes) {
   std::vector<Texture> samplers, out;
   root.for_each("samplers", [&](const Fields& f) {
-    samplers.push_back({.wrap_u = parse_wrap(f, "wrapS"), .wrap_v = parse_wrap(f, "wrapT"),
+    samplers.push_back({.wrap_u = parse_wrap(f, "wrapS"),
+                        .wrap_v = parse_wrap(f, "wrapT"),
                         .nearest = f.count("magFilter", 9729) == 9728});
   });
   root.for_each("textures", [&](const Fields& f) {
@@ -162,7 +175,8 @@ Light parse_light(const Fields& f) {
     light.outer_cone = real(spot, "outerConeAngle", 0.7853981633974483);
   }
   const Vec3f& i = light.intensity;
-  if (i.x < 0 || i.y < 0 || i.z < 0) f.findings().fail("light_negative", "A light must not be negative.", f.pointer("intensity"));
+  if (i.x < 0 || i.y < 0 || i.z < 0)
+    f.findings().fail("light_negative", "A light must not be negative.", f.pointer("intensity"));
   if (light.inner_cone < 0 || light.outer_cone > 1.5707964F || light.inner_cone > light.outer_cone) {
     f.findings().fail("light_cone", "Cone angles must satisfy 0 <= inner <= outer <= pi/2.", f.pointer("spot"));
   }

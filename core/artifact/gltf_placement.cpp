@@ -19,7 +19,9 @@ struct Visit {
 };
 
 bool sane(const Affine& m) {
-  const auto small = [](const Vec3d& v) { return std::abs(v.x) < kMaxTransform && std::abs(v.y) < kMaxTransform && std::abs(v.z) < kMaxTransform; };
+  const auto small = [](const Vec3d& v) {
+    return std::abs(v.x) < kMaxTransform && std::abs(v.y) < kMaxTransform && std::abs(v.z) < kMaxTransform;
+  };
   return is_finite(m) && small(m.x) && small(m.y) && small(m.z) && small(m.t);
 }
 
@@ -36,8 +38,8 @@ Affine from_trs(const Vec3d& t, const std::array<double, 4>& q, const Vec3d& s) 
 }
 
 /// An instancing attribute, or nothing if the node does not have it.
-std::vector<float> instance_values(const AccessorSource& source, const Node& node, const char* name, std::uint64_t width,
-                                   const std::string& place, Findings& findings) {
+std::vector<float> instance_values(const AccessorSource& source, const Node& node, const char* name,
+                                   std::uint64_t width, const std::string& place, Findings& findings) {
   const auto at = node.instancing.find(name);
   if (at == node.instancing.end()) return {};
   if (source.document.accessors[static_cast<std::size_t>(at->second)].width != width) {
@@ -58,7 +60,8 @@ std::array<double, 4> unit_quaternion(const float* q) {
   return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
 }
 
-std::vector<Affine> expand(const AccessorSource& source, const Node& node, const Affine& world, int index, Findings& findings) {
+std::vector<Affine> expand(const AccessorSource& source, const Node& node, const Affine& world, int index,
+                           Findings& findings) {
   if (!node.instanced) return {world};
   const std::string place = "/nodes/" + std::to_string(index) + "/extensions/EXT_mesh_gpu_instancing/attributes/";
   const std::uint64_t count = instance_count(source.document, node);
@@ -131,13 +134,15 @@ class Walk {
     const std::string place = "/nodes/" + std::to_string(visit.node);
     const auto& m = node.matrix;
     if (visit.depth > kMaxNodeDepth) {
-      return findings_.fail("node_too_deep", "Nodes are nested deeper than " + std::to_string(kMaxNodeDepth) + " levels.", place);
+      return findings_.fail("node_too_deep",
+                            "Nodes are nested deeper than " + std::to_string(kMaxNodeDepth) + " levels.", place);
     }
     const Affine world = visit.parent * local_of(node);
     if (!sane(world) || m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
       return findings_.fail("node_transform_invalid", "The transform is not finite or not affine.", place);
     }
-    if (node.light >= 0) out_.lights.push_back(placed(source_.document.lights[static_cast<std::size_t>(node.light)], world));
+    if (node.light >= 0)
+      out_.lights.push_back(placed(source_.document.lights[static_cast<std::size_t>(node.light)], world));
     if (node.mesh >= 0) place_mesh(node, visit.node, world);
     push(node.children, visit.depth + 1, world);
   }
@@ -150,10 +155,12 @@ class Walk {
     triangles_ += static_cast<double>(size.triangles) * static_cast<double>(count);
     check_expanded_size(whole(vertices_), whole(triangles_), limits_, findings_);
     if (findings_.failed()) return;
-    out_.meshes.push_back({.node = index, .mesh = node.mesh, .instances = expand(source_, node, world, index, findings_)});
+    out_.meshes.push_back(
+        {.node = index, .mesh = node.mesh, .instances = expand(source_, node, world, index, findings_)});
     for (const Affine& instance : out_.meshes.back().instances) {
       if (!sane(instance)) {
-        return findings_.fail("node_transform_invalid", "The transform of an instance is not finite.", "/nodes/" + std::to_string(index));
+        return findings_.fail("node_transform_invalid", "The transform of an instance is not finite.",
+                              "/nodes/" + std::to_string(index));
       }
     }
   }

@@ -1,7 +1,9 @@
 #include "core/artifact/gltf_primitive.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <string_view>
 
 namespace kiln::gltf {
 namespace {
@@ -13,7 +15,8 @@ std::uint64_t triangle_count(Mode mode, std::uint64_t corners) {
 const Accessor& accessor(const Document& d, int i) { return d.accessors[static_cast<std::size_t>(i)]; }
 
 /// Core component types, and those of KHR_mesh_quantization with a warning where it is not declared.
-void check_component(const Document& d, const std::string& name, const Accessor& a, const std::string& place, Findings& findings) {
+void check_component(const Document& d, const std::string& name, const Accessor& a, const std::string& place,
+                     Findings& findings) {
   if (a.component == Component::f32) return;
   const bool color = name == "COLOR_0", uv = name.substr(0, 9) == "TEXCOORD_";
   const bool is_unsigned = a.component == Component::u8 || a.component == Component::u16;
@@ -22,7 +25,21 @@ void check_component(const Document& d, const std::string& name, const Accessor&
   }
   const bool core = color || (uv && is_unsigned && a.normalized);
   if (!core && !d.declares_quantization) {
-    findings.warn("quantization_not_declared", "Integer components need KHR_mesh_quantization, which is not declared.", place);
+    findings.warn("quantization_not_declared", "Integer components need KHR_mesh_quantization, which is not declared.",
+                  place);
+  }
+}
+
+/// min and max are only a hint to Kiln, yet a file whose bounds lie is worth a word.
+void check_bounds(const Accessor& a, const RawPart& part, const std::string& place, Findings& findings) {
+  if (a.component != Component::f32 || a.min.size() != 3 || a.max.size() != 3) return;
+  for (const Vec3f& p : part.position) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double slack = 1e-5 * std::max({std::abs(a.min[i]), std::abs(a.max[i]), 1e-30});
+      if (p[i] >= a.min[i] - slack && p[i] <= a.max[i] + slack) continue;
+      return findings.warn("accessor_bounds_mismatch", "Values lie outside of the min and max of their accessor.",
+                           place);
+    }
   }
 }
 
@@ -33,11 +50,14 @@ void read_attributes(const AccessorSource& source, const Primitive& primitive, R
     const std::string place = part.place + "/attributes/" + name;
     const Accessor& a = accessor(source.document, index);
     check_component(source.document, name, a, place, findings);
-    if (!findings.failed()) set_attribute(part, name, read_floats(source, index, place, findings), a.width, place, findings);
+    if (!findings.failed())
+      set_attribute(part, name, read_floats(source, index, place, findings), a.width, place, findings);
+    if (!findings.failed() && std::string_view(name) == "POSITION") check_bounds(a, part, place, findings);
   }
 }
 
-std::vector<std::uint32_t> read_corners(const AccessorSource& source, const Primitive& primitive, const RawPart& part, Findings& findings) {
+std::vector<std::uint32_t> read_corners(const AccessorSource& source, const Primitive& primitive, const RawPart& part,
+                                        Findings& findings) {
   if (primitive.indices < 0) {
     std::vector<std::uint32_t> corners(part.position.size());
     std::iota(corners.begin(), corners.end(), 0U);
@@ -45,7 +65,8 @@ std::vector<std::uint32_t> read_corners(const AccessorSource& source, const Prim
   }
   const std::string place = part.place + "/indices";
   auto corners = read_indices(source, primitive.indices, place, findings);
-  const auto bad = std::find_if(corners.begin(), corners.end(), [&](std::uint32_t v) { return v >= part.position.size(); });
+  const auto bad =
+      std::find_if(corners.begin(), corners.end(), [&](std::uint32_t v) { return v >= part.position.size(); });
   if (bad != corners.end()) {
     findings.fail("index_out_of_range", std::to_string(*bad) + " >= " + std::to_string(part.position.size()),
                   place + " element " + std::to_string(bad - corners.begin()));
@@ -107,7 +128,8 @@ PrimitiveSize predicted_size(const Document& d, const Primitive& p) {
   return {p.attribute("NORMAL") >= 0 ? vertices : triangles * 3, triangles};
 }
 
-RawPart read_primitive(const AccessorSource& source, const Primitive& primitive, const std::string& place, Findings& findings) {
+RawPart read_primitive(const AccessorSource& source, const Primitive& primitive, const std::string& place,
+                       Findings& findings) {
   RawPart part;
   part.place = place;
   part.material = primitive.material;

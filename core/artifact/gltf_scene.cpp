@@ -26,12 +26,27 @@ void warn_of_rest_pose(const Document& d, Findings& findings) {
   for (std::size_t m = 0; m < d.meshes.size(); ++m) {
     const auto& primitives = d.meshes[m].primitives;
     if (std::any_of(primitives.begin(), primitives.end(), [](const Primitive& p) { return p.morphed; })) {
-      findings.warn("morph_rest_pose", "Morph targets are not applied; the mesh is baked in its rest pose.", "/meshes/" + std::to_string(m));
+      findings.warn("morph_rest_pose", "Morph targets are not applied; the mesh is baked in its rest pose.",
+                    "/meshes/" + std::to_string(m));
     }
   }
 }
 
-/// Cleaned parts of each mesh that stands somewhere; `first[m]` is the part of its first primitive.
+/// For a scene in which no primitive with surface stands.
+std::string why_empty(const Document& d) {
+  bool surface = false, any = false;
+  for (const Mesh& mesh : d.meshes) {
+    for (const Primitive& p : mesh.primitives) {
+      any = true;
+      surface |= has_surface(p);
+    }
+  }
+  if (surface) return "No node of the default scene has a mesh with triangles.";
+  return any ? "The meshes have only points and lines, or no positions: there is no surface to bake."
+             : "The file has no mesh.";
+}
+
+/// Cleaned parts of each mesh that stands somewhere.
 struct Parts {
   std::vector<RawPart> parts;
   std::vector<std::vector<std::size_t>> of_mesh;
@@ -65,14 +80,21 @@ Parts read_parts(const AccessorSource& source, const std::vector<Placement>& pla
   return out;
 }
 
-/// Primitives of meshes that no node places are read too, for their faults alone.
+/// Primitives of meshes that no node places are read too, for their faults alone, as long as that costs little.
 void check_unplaced(const AccessorSource& source, const std::vector<Placement>& placements, Findings& findings) {
+  constexpr std::uint64_t kMostTriangles = 1'000'000;
   const Document& d = source.document;
   std::vector<bool> placed(d.meshes.size());
   for (const Placement& placement : placements) placed[static_cast<std::size_t>(placement.mesh)] = true;
+  std::uint64_t triangles = 0;
   for (std::size_t m = 0; m < d.meshes.size(); ++m) {
     for (std::size_t p = 0; p < d.meshes[m].primitives.size() && !placed[m] && !findings.failed(); ++p) {
-      if (has_surface(d.meshes[m].primitives[p])) read_primitive(source, d.meshes[m].primitives[p], primitive_place(m, p), findings);
+      const Primitive& primitive = d.meshes[m].primitives[p];
+      if (!has_surface(primitive)) continue;
+      const PrimitiveSize size = predicted_size(d, primitive);
+      triangles += size.triangles + size.vertices;
+      if (triangles > kMostTriangles) return;
+      read_primitive(source, primitive, primitive_place(m, p), findings);
     }
   }
 }
@@ -82,10 +104,14 @@ std::vector<PlacedPart> place_parts(const Document& d, Parts& parts, std::vector
   for (Placement& placement : placements) {
     const Node& node = d.nodes[static_cast<std::size_t>(placement.node)];
     const Mesh& mesh = d.meshes[static_cast<std::size_t>(placement.mesh)];
-    const std::string base = !node.name.empty() ? node.name : !mesh.name.empty() ? mesh.name : "node " + std::to_string(placement.node);
+    const std::string base = !node.name.empty()   ? node.name
+                             : !mesh.name.empty() ? mesh.name
+                                                  : "node " + std::to_string(placement.node);
     const auto& of_mesh = parts.of_mesh[static_cast<std::size_t>(placement.mesh)];
     for (std::size_t i = 0; i < of_mesh.size(); ++i) {
-      out.push_back({.part = of_mesh[i], .name = i == 0 ? base : base + "." + std::to_string(i), .instances = placement.instances});
+      out.push_back({.part = of_mesh[i],
+                     .name = i == 0 ? base : base + "." + std::to_string(i),
+                     .instances = placement.instances});
     }
   }
   return out;
@@ -108,7 +134,8 @@ std::vector<Light> lights_in_unit_lengths(const std::vector<PlacedLight>& lights
     Light light = placed.light;
     light.position = to_float(frame.to_unit(placed.position));
     light.range = static_cast<float>(light.range / frame.scale);
-    if (light.type != LightType::directional) light.intensity = to_float(to_double(light.intensity) / (frame.scale * frame.scale));
+    if (light.type != LightType::directional)
+      light.intensity = to_float(to_double(light.intensity) / (frame.scale * frame.scale));
     out.push_back(light);
   }
   return out;
@@ -124,9 +151,11 @@ void check_lights(const std::vector<Light>& lights, Findings& findings) {
 
 }  // namespace
 
-Scene import_gltf(const GltfContainer& container, const SceneFiles& files, const ImportLimits& limits, Findings& findings) {
+Scene import_gltf(const GltfContainer& container, const SceneFiles& files, const ImportLimits& limits,
+                  Findings& findings) {
   Scene scene;
-  scan_json(container.json, {.max_bytes = limits.max_json_bytes, .max_depth = limits.max_json_depth, .max_objects = limits.max_objects},
+  scan_json(container.json,
+            {.max_bytes = limits.max_json_bytes, .max_depth = limits.max_json_depth, .max_objects = limits.max_objects},
             findings);
   if (findings.failed()) return scene;
   const Document document = parse_document(container.json, findings);
@@ -142,6 +171,7 @@ Scene import_gltf(const GltfContainer& container, const SceneFiles& files, const
   scene.materials = document.materials;
   scene.textures = document.textures;
   scene.images = load_images(document, bytes, files, limits, findings);
+  if (parts.parts.empty()) findings.fail("empty_scene", why_empty(document));
   add_default_material(scene, parts.parts);
   if (findings.failed()) return scene;
   assemble(parts.parts, place_parts(document, parts, placements.meshes), limits, scene, findings);

@@ -134,13 +134,17 @@ Result<Environment> read_hdr(Span file, const std::string& name) {
     return fault("hdr_invalid", "The header is not that of an RGBE picture with rows from top to bottom.", name);
   }
   if (header.width > kMaxEnvironmentWidth || header.height > kMaxEnvironmentHeight) {
-    return fault("image_too_large", std::to_string(header.width) + " x " + std::to_string(header.height) +
-                                        " pixels; an environment may have 8192 x 4096.", name);
+    return fault("image_too_large",
+                 std::to_string(header.width) + " x " + std::to_string(header.height) +
+                     " pixels; an environment may have 8192 x 4096.",
+                 name);
   }
   Environment out{.name = name, .width = header.width, .height = header.height, .radiance = {}};
   std::vector<Rgbe> row(static_cast<std::size_t>(header.width));
   for (int y = 0; y < header.height; ++y) {
-    if (!read_row(file, row)) return fault("hdr_truncated", "The pixels end early or are not encoded as they should.", name + ": row " + std::to_string(y));
+    if (!read_row(file, row))
+      return fault("hdr_truncated", "The pixels end early or are not encoded as they should.",
+                   name + ": row " + std::to_string(y));
     for (const Rgbe& pixel : row) out.radiance.push_back(to_radiance(pixel, header.exposure));
   }
   return out;

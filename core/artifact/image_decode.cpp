@@ -27,7 +27,8 @@ namespace {
 using Span = std::span<const std::uint8_t>;
 
 std::uint64_t big_endian32(Span file, std::size_t at) {
-  return std::uint64_t{file[at]} << 24 | std::uint64_t{file[at + 1]} << 16 | std::uint64_t{file[at + 2]} << 8 | file[at + 3];
+  return std::uint64_t{file[at]} << 24 | std::uint64_t{file[at + 1]} << 16 | std::uint64_t{file[at + 2]} << 8 |
+         file[at + 3];
 }
 
 /// The IDAT chunks of a PNG, joined.
@@ -44,7 +45,8 @@ std::vector<std::uint8_t> png_stream(Span file) {
   return out;
 }
 
-/// Upper bound of the inflated rows of a PNG: each with a filter byte, and seven passes' worth of rounding when interlaced.
+/// Upper bound of the inflated rows of a PNG: each with a filter byte, and seven passes' worth of rounding when
+/// interlaced.
 std::uint64_t png_raw_bytes(Span file, const ImageHeader& header) {
   const std::uint64_t depth = file[24], color = file[25], interlaced = file[28];
   const std::uint64_t channels = color == 2 ? 3 : color == 4 ? 2 : color == 6 ? 4 : 1;
@@ -70,8 +72,10 @@ std::optional<std::vector<std::uint8_t>> decode_image(Span file, const ImageHead
   if (header.mime == "image/png" && !png_keeps_to_its_size(file, header)) return std::nullopt;
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
-      stbi_load_from_memory(file.data(), static_cast<int>(file.size()), &width, &height, &channels, 4), &stbi_image_free);
-  if (!pixels || static_cast<std::uint64_t>(width) != header.width || static_cast<std::uint64_t>(height) != header.height) {
+      stbi_load_from_memory(file.data(), static_cast<int>(file.size()), &width, &height, &channels, 4),
+      &stbi_image_free);
+  if (!pixels || static_cast<std::uint64_t>(width) != header.width ||
+      static_cast<std::uint64_t>(height) != header.height) {
     return std::nullopt;
   }
   return std::vector<std::uint8_t>(pixels.get(), pixels.get() + header.width * header.height * 4);

@@ -22,7 +22,8 @@ std::uint64_t big_endian(Span file, std::size_t at, std::size_t bytes) {
 /// Signature, then IHDR: length 13, "IHDR", width, height.
 std::optional<ImageHeader> png_header(Span file) {
   constexpr std::size_t kIhdrEnd = 33;
-  if (file.size() < kIhdrEnd || big_endian(file, 8, 4) != 13 || big_endian(file, 12, 4) != 0x49484452) return std::nullopt;
+  if (file.size() < kIhdrEnd || big_endian(file, 8, 4) != 13 || big_endian(file, 12, 4) != 0x49484452)
+    return std::nullopt;
   return ImageHeader{"image/png", big_endian(file, 16, 4), big_endian(file, 20, 4)};
 }
 
@@ -58,7 +59,8 @@ std::optional<ImageHeader> read_image_header(Span file) {
   if (starts_with(file, kPng)) return png_header(file);
   if (starts_with(file, kJpeg)) return jpeg_header(file);
   if (starts_with(file, kKtx2)) return ImageHeader{"image/ktx2", 0, 0};
-  if (starts_with(file, kRiff) && file.size() >= 12 && big_endian(file, 8, 4) == 0x57454250) return ImageHeader{"image/webp", 0, 0};
+  if (starts_with(file, kRiff) && file.size() >= 12 && big_endian(file, 8, 4) == 0x57454250)
+    return ImageHeader{"image/webp", 0, 0};
   return std::nullopt;
 }
 

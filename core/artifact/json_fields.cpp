@@ -78,7 +78,8 @@ int Fields::as_index(const nlohmann::json& value, const std::string& place, std:
     wrong_type(place, "an index");
   } else {
     findings_->fail("index_out_of_range",
-                    "Index " + std::to_string(static_cast<std::uint64_t>(x)) + " >= " + std::to_string(size) + ".", place);
+                    "Index " + std::to_string(static_cast<std::uint64_t>(x)) + " >= " + std::to_string(size) + ".",
+                    place);
   }
   return -1;
 }

@@ -60,7 +60,8 @@ class Scanner : public nlohmann::json_sax<Json> {
   bool cost(std::size_t bytes) {
     tree_bytes_ += bytes;
     if (tree_bytes_ <= limits_.max_tree_bytes) return true;
-    return too_many("The JSON would take more than " + std::to_string(limits_.max_tree_bytes >> 20) + " MiB of memory.");
+    return too_many("The JSON would take more than " + std::to_string(limits_.max_tree_bytes >> 20) +
+                    " MiB of memory.");
   }
   bool too_many(std::string message) {
     findings_.fail("too_many_objects", std::move(message));

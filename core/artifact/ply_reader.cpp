@@ -16,11 +16,22 @@ using Span = std::span<const std::uint8_t>;
 constexpr std::size_t kMaxHeaderBytes = 64 * 1024;
 
 std::optional<PlyType> type_named(const std::string& name) {
-  constexpr std::array<std::pair<const char*, PlyType>, 16> kNames{{{"char", PlyType::i8}, {"uchar", PlyType::u8},
-      {"short", PlyType::i16}, {"ushort", PlyType::u16}, {"int", PlyType::i32}, {"uint", PlyType::u32},
-      {"float", PlyType::f32}, {"double", PlyType::f64}, {"int8", PlyType::i8}, {"uint8", PlyType::u8},
-      {"int16", PlyType::i16}, {"uint16", PlyType::u16}, {"int32", PlyType::i32}, {"uint32", PlyType::u32},
-      {"float32", PlyType::f32}, {"float64", PlyType::f64}}};
+  constexpr std::array<std::pair<const char*, PlyType>, 16> kNames{{{"char", PlyType::i8},
+                                                                    {"uchar", PlyType::u8},
+                                                                    {"short", PlyType::i16},
+                                                                    {"ushort", PlyType::u16},
+                                                                    {"int", PlyType::i32},
+                                                                    {"uint", PlyType::u32},
+                                                                    {"float", PlyType::f32},
+                                                                    {"double", PlyType::f64},
+                                                                    {"int8", PlyType::i8},
+                                                                    {"uint8", PlyType::u8},
+                                                                    {"int16", PlyType::i16},
+                                                                    {"uint16", PlyType::u16},
+                                                                    {"int32", PlyType::i32},
+                                                                    {"uint32", PlyType::u32},
+                                                                    {"float32", PlyType::f32},
+                                                                    {"float64", PlyType::f64}}};
   for (const auto& [text, type] : kNames) {
     if (name == text) return type;
   }
@@ -83,7 +94,9 @@ void check_counts(const PlyHeader& header, std::uint64_t body, Findings& finding
   for (const PlyElement& e : header.elements) {
     if (e.properties.empty() && e.count > 0) continue;  // no data stands for it
     if (e.count <= body / least_bytes(e, header.form)) continue;
-    findings.fail("ply_truncated", "The header tells of more elements than the file has bytes for: " + std::to_string(e.count) + ".", "header");
+    findings.fail("ply_truncated",
+                  "The header tells of more elements than the file has bytes for: " + std::to_string(e.count) + ".",
+                  "header");
   }
 }
 
@@ -92,11 +105,15 @@ void check_counts(const PlyHeader& header, std::uint64_t body, Findings& finding
 std::uint64_t ply_bytes(PlyType type) {
   switch (type) {
     case PlyType::i8:
-    case PlyType::u8: return 1;
+    case PlyType::u8:
+      return 1;
     case PlyType::i16:
-    case PlyType::u16: return 2;
-    case PlyType::f64: return 8;
-    default: return 4;
+    case PlyType::u16:
+      return 2;
+    case PlyType::f64:
+      return 8;
+    default:
+      return 4;
   }
 }
 
@@ -153,14 +170,22 @@ std::optional<double> PlyNumbers::next(PlyType type) {
   };
   static_assert(std::endian::native == std::endian::little);
   switch (type) {
-    case PlyType::i8: return as(std::int8_t{});
-    case PlyType::u8: return as(std::uint8_t{});
-    case PlyType::i16: return as(std::int16_t{});
-    case PlyType::u16: return as(std::uint16_t{});
-    case PlyType::i32: return as(std::int32_t{});
-    case PlyType::u32: return as(std::uint32_t{});
-    case PlyType::f32: return as(float{});
-    case PlyType::f64: return as(double{});
+    case PlyType::i8:
+      return as(std::int8_t{});
+    case PlyType::u8:
+      return as(std::uint8_t{});
+    case PlyType::i16:
+      return as(std::int16_t{});
+    case PlyType::u16:
+      return as(std::uint16_t{});
+    case PlyType::i32:
+      return as(std::int32_t{});
+    case PlyType::u32:
+      return as(std::uint32_t{});
+    case PlyType::f32:
+      return as(float{});
+    case PlyType::f64:
+      return as(double{});
   }
   return std::nullopt;
 }

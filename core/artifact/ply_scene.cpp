@@ -30,7 +30,8 @@ Columns columns_of(const PlyElement& vertex) {
   };
   Columns c{.position = {column({"x"}), column({"y"}), column({"z"})},
             .normal = {column({"nx"}), column({"ny"}), column({"nz"})},
-            .color = {column({"red", "r", "diffuse_red"}), column({"green", "g", "diffuse_green"}), column({"blue", "b", "diffuse_blue"})},
+            .color = {column({"red", "r", "diffuse_red"}), column({"green", "g", "diffuse_green"}),
+                      column({"blue", "b", "diffuse_blue"})},
             .alpha = column({"alpha", "a"}),
             .uv = {column({"u", "s", "texture_u"}), column({"v", "t", "texture_v"})}};
   if (c.color[0] >= 0) c.color_is_bytes = vertex.properties[static_cast<std::size_t>(c.color[0])].type == PlyType::u8;
@@ -54,8 +55,11 @@ Vec3f pick3(const std::vector<double>& row, const int (&c)[3]) {
 Vec4f pick_color(const std::vector<double>& row, const Columns& c) {
   const double unit = c.color_is_bytes ? 1 / 255.0 : 1;
   const auto at = [&](int column) { return std::clamp(row[static_cast<std::size_t>(column)] * unit, 0.0, 1.0); };
-  const auto linear = [&](int column) { return c.color_is_bytes ? srgb_to_linear(at(column)) : static_cast<float>(at(column)); };
-  return {linear(c.color[0]), linear(c.color[1]), linear(c.color[2]), c.alpha < 0 ? 1.0F : static_cast<float>(at(c.alpha))};
+  const auto linear = [&](int column) {
+    return c.color_is_bytes ? srgb_to_linear(at(column)) : static_cast<float>(at(column));
+  };
+  return {linear(c.color[0]), linear(c.color[1]), linear(c.color[2]),
+          c.alpha < 0 ? 1.0F : static_cast<float>(at(c.alpha))};
 }
 
 /// v runs upwards in PLY files that have it, downwards in glTF.
@@ -64,7 +68,8 @@ void take_vertex(const std::vector<double>& row, const Columns& c, RawPart& part
   if (present(c.normal)) part.normal.push_back(pick3(row, c.normal));
   if (present(c.color)) part.color.push_back(pick_color(row, c));
   if (present(c.uv)) {
-    part.uv0.push_back({static_cast<float>(row[static_cast<std::size_t>(c.uv[0])]), 1 - static_cast<float>(row[static_cast<std::size_t>(c.uv[1])])});
+    part.uv0.push_back({static_cast<float>(row[static_cast<std::size_t>(c.uv[0])]),
+                        1 - static_cast<float>(row[static_cast<std::size_t>(c.uv[1])])});
   }
 }
 
@@ -112,7 +117,9 @@ void read_vertices(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings&
 
 void read_faces(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings& findings) {
   std::vector<double> values, corners;
-  const auto is_corners = [](const PlyProperty& p) { return p.list && (p.name == "vertex_indices" || p.name == "vertex_index"); };
+  const auto is_corners = [](const PlyProperty& p) {
+    return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
+  };
   if (std::none_of(e.properties.begin(), e.properties.end(), is_corners)) {
     return findings.fail("ply_invalid", "Faces have no list of vertex_indices.", "header");
   }
@@ -124,7 +131,8 @@ void read_faces(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings& fi
     for (const double v : corners) {
       if (v >= 0 && v < static_cast<double>(part.position.size()) && v == std::floor(v)) continue;
       return findings.fail("index_out_of_range",
-                           "A vertex index is not one of the " + std::to_string(part.position.size()) + " vertices.", element_place(e, i));
+                           "A vertex index is not one of the " + std::to_string(part.position.size()) + " vertices.",
+                           element_place(e, i));
     }
     for (std::size_t k = 2; k < corners.size(); ++k) {
       part.triangles.push_back({static_cast<std::uint32_t>(corners[0]), static_cast<std::uint32_t>(corners[k - 1]),

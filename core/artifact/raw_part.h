@@ -25,7 +25,8 @@ enum class MissingNormals { flat, smooth };
 /// Leaves only what a bake can use, and says what it did:
 ///   triangles without area and repeated triangles go; unreferenced vertices go;
 ///   missing normals are made from the faces (flat as glTF asks, by unsharing vertices, or smooth by area);
-///   zero normals are made smooth, others brought to length 1; normals behind their faces are mirrored to the front;
+///   zero normals are made smooth, others brought to length 1; winding is turned round if most normals contradict it,
+///   else the normals behind their faces are mirrored to the front;
 ///   tangents without direction drop the whole attribute.
 /// Cost O(n) expected.
 void clean_part(RawPart&, MissingNormals, Findings&);

@@ -6,7 +6,6 @@
 
 #include "core/artifact/baked_geometry.h"
 #include "core/artifact/glb.h"
-#include "core/artifact/look.h"
 #include "core/artifact/png.h"
 #include "core/base/expects.h"
 
@@ -46,10 +45,9 @@ Result<std::vector<StreamBytes>> stream_bytes(const BakedScene& baked, const Enc
                                               std::span<const std::uint8_t> file) {
   std::vector<StreamBytes> rows;
   for (const char* name : kNames) rows.push_back({name, 0});
-  const std::vector<Vec3f> colors = displayed_colors(baked);
-  for (const PartPrimitive& part : part_primitives(baked, {}, colors, {encoding, false})) {
-    if (const auto done = add_part(part, encoding.speed, rows); !done) return tl::make_unexpected(done.error());
-  }
+  const auto done = visit_part_primitives(
+      baked, {encoding, nullptr}, [&](const PartPrimitive& part) { return add_part(part, encoding.speed, rows); });
+  if (!done) return tl::make_unexpected(done.error());
   KILN_TRY(chunks, split_glb(file));
   std::uint64_t images = 0;
   for (const Image& image : baked.scene.images) {

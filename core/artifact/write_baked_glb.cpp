@@ -67,21 +67,22 @@ class Writer {
   }
 
   Result<void> add_parts() {
-    const GeometryOptions options{encoding_, true};
-    for (const PartPrimitive& part : part_primitives(baked_, ranges_, displayed_colors(baked_), options)) {
-      KILN_TRY(bytes, encode_draco(part.mesh, encoding_.speed));
-      KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), part.mesh.triangles.size()}));
+    return visit_part_primitives(baked_, {encoding_, &ranges_}, [this](PartPrimitive part) -> Result<void> {
+      const std::size_t triangles = part.mesh.triangles.size();
+      KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
+      KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), triangles, true}));
       add_primitives(part, decoded, add_view(bytes));
-    }
-    return {};
+      return {};
+    });
   }
 
   /// An accessor without a buffer view, as the Draco extension asks; counts and bounds are those of the decoded data.
-  std::size_t add_stream_accessor(const std::string& name, const DecodedStream& stream, std::uint32_t count) {
+  std::size_t add_stream_accessor(const NamedStream& stream, const DecodedMesh& decoded) {
     static constexpr std::array kTypes{"SCALAR", "VEC2", "VEC3", "VEC4"};
-    json accessor{
-        {"componentType", kFloat}, {"count", count}, {"type", kTypes[static_cast<std::size_t>(stream.components - 1)]}};
-    if (name == "POSITION") put_bounds(stream.values, accessor);
+    json accessor{{"componentType", kFloat},
+                  {"count", decoded.vertices},
+                  {"type", kTypes[static_cast<std::size_t>(stream.components - 1)]}};
+    if (stream.name == "POSITION") put_bounds(decoded.streams.at(0).values, accessor);
     return add_accessor(std::move(accessor));
   }
 
@@ -102,10 +103,10 @@ class Writer {
         add_accessor({{"componentType", kUnsignedInt}, {"count", decoded.triangles.size() * 3}, {"type", "SCALAR"}});
     json baked_attributes, baked_ids, original_attributes, original_ids;
     for (std::uint32_t id = 0; id < source.names.size(); ++id) {
-      const NamedStream& name = source.names[id];
-      const std::size_t accessor = add_stream_accessor(name.name, decoded.streams.at(id), decoded.vertices);
-      if (name.in_baked) baked_attributes[name.name] = accessor, baked_ids[name.name] = id;
-      if (name.in_original) original_attributes[name.name] = accessor, original_ids[name.name] = id;
+      const NamedStream& stream = source.names[id];
+      const std::size_t accessor = add_stream_accessor(stream, decoded);
+      if (stream.in_baked) baked_attributes[stream.name] = accessor, baked_ids[stream.name] = id;
+      if (stream.in_original) original_attributes[stream.name] = accessor, original_ids[stream.name] = id;
     }
     json baked = primitive_json(baked_attributes, baked_ids, view, indices);
     baked["material"] = materials + material;
