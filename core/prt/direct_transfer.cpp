@@ -24,12 +24,13 @@ using Row = std::array<float, kMaxRow>;
 
 }  // namespace
 
+DirectionSets transfer_directions(const DirectTransfer& params) {
+  return DirectionSets(params.order, params.samples, kSets, mix64(params.seed));
+}
+
 struct DirectTransferBaker::State {
   State(const Tracer& tracer, const DirectTransfer& params)
-      : tracer_(tracer),
-        params_(params),
-        sets_(params.order, params.samples, kSets, mix64(params.seed)),
-        support_(tracer.scene().mesh.position) {}
+      : tracer_(tracer), params_(params), sets_(transfer_directions(params)), support_(tracer.scene().mesh.position) {}
 
   // Writes the transfer vector of a point; true if it took rays.
   bool bake(const TransferPoint& point, std::uint64_t item, float* out) const {

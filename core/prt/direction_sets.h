@@ -39,6 +39,10 @@ class DirectionSets {
   std::vector<float> x_, y_, z_, rows_;
 };
 
+struct DirectTransfer;
+/// The sets that direct transfer takes for these parameters.
+DirectionSets transfer_directions(const DirectTransfer&);
+
 /// Which set a point takes and its frame: z along the normal, azimuth by hash.
 struct LocalFrame {
   int set = 0;

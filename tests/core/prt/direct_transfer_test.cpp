@@ -120,7 +120,7 @@ TEST(Transfer, FastProjectionAgreesWithASlowLoopInDouble) {
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
   const DirectTransfer params{.order = 6, .samples = 256, .seed = 5};
   const std::vector<float> fast = bake_direct_transfer(tracer, points, params, pool);
-  const DirectionSets sets(6, 256, 4, mix64(5));
+  const DirectionSets sets = transfer_directions(params);
   for (std::size_t v = 0; v < points.size(); v += 7) {
     const LocalFrame frame = local_frame(sets, points[v].normal, 5, point_key(points[v]));
     std::array<double, 36> open{}, y{};

@@ -1,0 +1,6 @@
+if(TARGET kiln_reference_set)
+  add_executable(kiln_transfer_rates transfer_rates.cpp)
+  kiln_flags(kiln_transfer_rates)
+  target_link_libraries(kiln_transfer_rates PRIVATE kiln_prt kiln_reference_set kiln_prt_scenes embree)
+  target_compile_definitions(kiln_transfer_rates PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
+endif()
