@@ -27,7 +27,7 @@ function sizes({ model, asset }: Viewer): Row[] {
     ['File', `${bytes(asset.bytes)}, ${per.toFixed(1)} B per vertex`],
     ['Harmonics', `order ${order}, ${order * order} × ${channels === 3 ? 'RGB' : 'grey'}`],
     ['Numbers per vertex', `${channels * slots}${fixed ? ', lamps among them' : ''}`],
-    ['Units', units ?? '–'],
+    ['Units', (units ?? '–').replace('^-1', '⁻¹').replace('^-2', '⁻²')],
   ];
 }
 
