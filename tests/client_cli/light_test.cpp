@@ -1,0 +1,140 @@
+// points, eval, reference and a local bake by the built program, on scenes whose light is known in closed form.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "client_cli/csv.h"
+#include "client_cli/values.h"
+#include "tests/client_cli/run_kiln.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kPi = std::numbers::pi;
+
+class Light : public ::testing::Test {
+ protected:
+  Folder folder;
+  std::string scene = folder.write("plane.gltf", plane_gltf(1, 8));
+
+  std::string draw(const std::string& input, int count) {
+    const Ran ran =
+        run_kiln({"points", input, "--count", std::to_string(count), "--seed", "5", "-o", folder.path("p.csv")});
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    return folder.path("p.csv");
+  }
+  ValueTable values(std::vector<std::string> words) {
+    words.insert(words.end(), {"-o", folder.path("v.csv")});
+    const Ran ran = run_kiln(words);
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    const auto table = read_values(folder.path("v.csv"));
+    return table ? *table : ValueTable{};
+  }
+};
+
+TEST_F(Light, PointsLieOnTheSurfaceEvenlyAndRepeat) {
+  const auto points = read_points(draw(scene, 400));
+  ASSERT_TRUE(points);
+  ASSERT_EQ(points->size(), 400U);
+  double right = 0;
+  for (const QueryPoint& point : *points) {
+    EXPECT_NEAR(point.position.y, 0, 1e-6);  // a float step of the unit cube
+    EXPECT_LE(std::abs(point.position.x), 1 + 1e-6);
+    EXPECT_NEAR(point.normal.y, 1, 1e-6);
+    right += point.position.x > 0;
+  }
+  EXPECT_NEAR(right / 400, 0.5, 0.1);  // 4 sigma of 400 coin tosses
+  const std::string first = folder.read("p.csv");
+  draw(scene, 400);
+  EXPECT_EQ(folder.read("p.csv"), first);
+}
+
+TEST_F(Light, APlaneUnderAConstantSkyOfOneReceivesPi) {
+  const ValueTable truth =
+      values({"reference", scene, "--points", draw(scene, 50), "--env", "1,1,1", "--samples", "64"});
+  ASSERT_EQ(truth.values.size(), 50U);
+  EXPECT_TRUE(truth.has_errors);
+  for (const LightValue& value : truth.values) {
+    EXPECT_NEAR(value.irradiance.x, kPi, 1e-5);  // cosine-distributed paths: exact up to float rounding
+    EXPECT_NEAR(value.radiance.z, 1, 1e-5);
+    EXPECT_NEAR(value.irradiance_error.y, 0, 1e-5);
+  }
+}
+
+TEST_F(Light, TheReferenceIsLinearInItsLight) {
+  const ValueTable truth = values(
+      {"reference", scene, "--points", draw(scene, 5), "--env", "0.5,1,4", "--intensity", "2", "--samples", "16"});
+  for (const LightValue& value : truth.values) {
+    EXPECT_NEAR(value.radiance.x, 1, 1e-5);
+    EXPECT_NEAR(value.radiance.y, 2, 1e-5);
+    EXPECT_NEAR(value.radiance.z, 8, 1e-4);
+  }
+}
+
+TEST_F(Light, ABakedPlaneEvaluatesToThePathTracedTruth) {
+  const Ran bake = run_kiln({"bake", scene, "--env", "1,1,1", "--quality", "draft", "-o", folder.path("out")});
+  ASSERT_EQ(bake.exit, 0) << bake.err;
+  EXPECT_NE(bake.out.find("scene.glb"), std::string::npos);
+  EXPECT_NE(bake.err.find("100 %"), std::string::npos) << "one line per 10 %, no bar: stderr is no terminal";
+  const std::string artefact = folder.path("out/scene.glb");
+  const std::string points = draw(artefact, 60);
+  const ValueTable own = values({"eval", artefact, "--points", points});
+  ASSERT_EQ(own.values.size(), 60U);
+  for (const LightValue& value : own.values) {
+    // 12-bit coefficients over a range of about 1: half a step is 1.2e-4 for each of up to 36 of them.
+    EXPECT_NEAR(value.irradiance.x, kPi, 0.01);
+    EXPECT_NEAR(value.radiance.y, 1, 0.003);
+    EXPECT_LT(value.distance, 1e-6);
+  }
+  const ValueTable blue = values({"eval", artefact, "--points", points, "--env", "0,0,2"});
+  EXPECT_NEAR(blue.values[0].radiance.x, 0, 1e-6);
+  EXPECT_NEAR(blue.values[0].radiance.z, 2, 0.006);
+  ASSERT_EQ(run_kiln({"eval", artefact, "--points", points, "-o", folder.path("a.csv")}).exit, 0);
+  ASSERT_EQ(run_kiln({"reference", scene, "--points", points, "--env", "1,1,1", "--samples", "64", "-o",
+                      folder.path("b.csv")})
+                .exit,
+            0);
+  EXPECT_EQ(run_kiln({"compare", folder.path("a.csv"), folder.path("b.csv"), "--max-error", "0.005"}).exit, 0);
+  EXPECT_EQ(run_kiln({"compare", artefact, artefact, "--max-error", "0"}).exit, 0) << "an artefact is like itself";
+  EXPECT_EQ(run_kiln({"compare", artefact, folder.path("b.csv"), "--max-error", "0.005"}).exit, 0);
+  EXPECT_EQ(run_kiln({"eval", scene, "--points", points}).exit, 7) << "a scene is no artefact";
+  const json facts = json::parse(run_kiln({"inspect", artefact, "--json"}).out);
+  EXPECT_EQ(facts.at("kind"), "artefact");
+  EXPECT_TRUE(facts.at("attributes").contains("_PRT_0"));
+  EXPECT_TRUE(facts.at("certificate").is_object()) << "report.json stands beside it";
+}
+
+TEST_F(Light, APointThatFacesAwayHasNoValue) {
+  const auto points = folder.write("p.csv", "0.1,0,0.2,0,1,0\n0.1,0,0.2,0,-1,0\n0.1,0.5,0.2,0,0,0\n");
+  const Ran ran = run_kiln({"reference", scene, "--points", points, "--env", "1,1,1", "--samples", "16", "--json"});
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const json rows = json::parse(ran.out);
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_NEAR(rows[0].at("radiance_rgb")[0].get<double>(), 1, 1e-5);
+  EXPECT_TRUE(rows[1].at("radiance_rgb").is_null());
+  EXPECT_NEAR(rows[2].at("distance").get<double>(), 0.5, 1e-6);
+  EXPECT_NE(ran.err.find("1 of 3 points"), std::string::npos);
+}
+
+TEST_F(Light, APlanSaysWhatAndWhyWithoutBaking) {
+  const Ran text = run_kiln({"plan", scene});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_NE(text.out.find("bounces"), std::string::npos);
+  EXPECT_TRUE(json::parse(run_kiln({"plan", scene, "--json"}).out).at("plan").is_array());
+}
+
+TEST_F(Light, CtrlCStopsALocalBakeWithOneHundredAndThirty) {
+  const auto big = folder.path("column.glb");
+  ASSERT_EQ(run_kiln({"demo-scene", "column", "-o", big}).exit, 0);
+  const auto recipe = folder.write("slow.json", R"({"steps":[{"do":"prt","order":10,"samples":65536,"bounces":8}],)"
+                                                R"("environment":{"builtin":"clear"}})");
+  const Ran ran = run_until({"bake", big, "-r", recipe, "-o", folder.path("never")}, "0 %");
+  EXPECT_EQ(ran.exit, 130) << ran.err;
+}
+
+}  // namespace
+}  // namespace kiln
