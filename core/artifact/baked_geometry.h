@@ -2,6 +2,7 @@
 // The parts of a baked scene as Draco primitives: which streams a part has, on which grids, under which glTF names.
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct NamedStream {
   std::string name;  // of the attribute: "POSITION", "_PRT_0", ...
   bool in_baked = true;
   bool in_original = true;
+  int components = 0;  // floats of an element
 };
 
 struct PartPrimitive {
@@ -28,14 +30,15 @@ struct PartPrimitive {
 /// The vertices that a triangle with three different corners uses, ascending: all that the file will hold.
 std::vector<std::uint32_t> used_vertices(const Mesh&);
 
-/// What of a part's streams is made; measuring sizes leaves the coefficients out.
 struct GeometryOptions {
   Encoding encoding;
-  bool coefficients = true;
+  const SlotRanges* ranges = nullptr;  // of the coefficients; null leaves them out (to measure sizes)
 };
 
-/// One primitive for each part that has such a triangle. `colors` is COLOR_0's displayed light of every vertex.
-std::vector<PartPrimitive> part_primitives(const BakedScene&, const SlotRanges&, std::span<const Vec3f> colors,
-                                           const GeometryOptions&);
+/// Takes one part at a time, so that no more than one part's streams are in memory. A fault ends the visit.
+using PartVisitor = std::function<Result<void>(PartPrimitive)>;
+
+/// Calls `visit` for each part that has a triangle with three different corners, in order.
+Result<void> visit_part_primitives(const BakedScene&, const GeometryOptions&, const PartVisitor& visit);
 
 }  // namespace kiln

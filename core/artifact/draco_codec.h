@@ -48,12 +48,16 @@ struct DecodedMesh {
 
 /// Edgebreaker, or sequential where edgebreaker cannot take the mesh. Vertices come back reordered and, at non-manifold
 /// places, doubled.  Repeat: same bytes for same input.  Expects finite values, indices in range, at least a triangle.
-Result<Bytes> encode_draco(const DracoMesh&, int speed);
+/// Memory  streams are freed as they are taken over, so that values exist once while they are compressed.
+Result<Bytes> encode_draco(DracoMesh, int speed);
 
-/// Decodes untrusted bytes; `max_vertices` and `max_triangles` are what the file's accessors promise.
-struct DracoLimits {
+/// `max_vertices` and `max_triangles` are what the file's accessors promise.
+struct DracoDecode {
   std::uint64_t max_vertices = 0, max_triangles = 0;
+  bool positions_only = false;  // leave the other streams out of the result
 };
-Result<DecodedMesh> decode_draco(std::span<const std::uint8_t> bytes, const DracoLimits&);
+
+/// Decodes untrusted bytes. Fails with draco_damaged.
+Result<DecodedMesh> decode_draco(std::span<const std::uint8_t> bytes, const DracoDecode&);
 
 }  // namespace kiln

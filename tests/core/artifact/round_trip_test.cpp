@@ -150,6 +150,19 @@ TEST(BakedScene, AttributesOfEachPartComeBack) {
   }
 }
 
+TEST(BakedScene, TextureCoordinatesFarOutsideKeepTheirGrid) {
+  BakedScene written = random_baked({.order = 1, .channels = 1});
+  for (Vec2f& uv : written.scene.mesh.uv0) uv = {uv.x * 1e5F, uv.y};  // 60e5 to 140e5: at 24 bits a step is about 0.5
+  const BakedScene read = round_trip(written);
+  const auto original = original_vertices(read);
+  for (std::size_t t = 0; t < read.scene.mesh.triangles.size(); ++t) {
+    if (!read.scene.parts[read.scene.mesh.part[t]].has_uv0) continue;
+    const auto v = read.scene.mesh.triangles[t][0];
+    const double rounding = 2 * 140e5 * 0x1p-24;  // of origin + step * level to float
+    ASSERT_NEAR(written.scene.mesh.uv0[original[v]].x, read.scene.mesh.uv0[v].x, half_step(80e5, 24) + rounding);
+  }
+}
+
 TEST(BakedScene, PartsKeepNameMaterialAndAttributes) {
   const BakedScene written = random_baked({.order = 1});
   const BakedScene read = round_trip(written);

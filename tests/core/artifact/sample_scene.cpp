@@ -7,6 +7,7 @@
 #include "core/artifact/look.h"
 #include "core/artifact/png.h"
 #include "core/sphere/sh.h"
+#include "tests/core/artifact/random_baked.h"
 
 namespace kiln {
 namespace {
@@ -123,6 +124,25 @@ BakedScene sphere_over_plane(int order, int channels, bool fixed) {
   out.light = {"soft sky", soft_sky(order)};
   out.exposure = automatic_exposure(scene.mesh, baked_colors(out));
   out.provenance = R"({"engine":"sample","seed":0})";
+  return out;
+}
+
+BakedScene everything(int order, int channels) {
+  BakedScene out = random_baked({.order = order, .channels = channels, .fixed = true});
+  Scene& scene = out.scene;
+  scene.images = {checker(), {"lost", "image/jpeg", {}, 0, 0, {}}};
+  scene.textures = {{0, Wrap::mirror, Wrap::clamp, true}, {1, Wrap::repeat, Wrap::repeat, false}};
+  Material& m = scene.materials[1];
+  m.base_color_texture = {0, 0, {0, 2, 0.5F, -3, 0, 0.25F}, 1};  // a quarter turn, scaled by 3 and 2
+  m.metallic_roughness_texture.texture = m.emission_texture.texture = 1;
+  m.normal_texture = {0, 0, {1, 0, 0, 0, 1, 0}, 0.5F};
+  m.alpha_mode = AlphaMode::mask;
+  m.double_sided = true;
+  scene.lights = {{LightType::directional, "sun", {3, 2, 1}, {}, {0, -1, 0}, 0, 0, 0},
+                  {LightType::point, "bulb", {0, 0.5F, 0}, {0.1F, 0.2F, -0.3F}, {0, 0, -1}, 0.25F, 0, 0},
+                  {LightType::spot, "spot", {9, 9, 9}, {0.5F, 0, 0}, {0, 0, 1}, 0, 0.1F, 0.9F}};
+  out.light = {"soft sky", soft_sky(order)};
+  out.exposure = automatic_exposure(scene.mesh, baked_colors(out));
   return out;
 }
 

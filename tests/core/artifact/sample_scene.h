@@ -9,6 +9,10 @@ namespace kiln {
 /// colours on the sphere. Transfer is the clamped cosine times a smooth guess of the occlusion; `order` 1..10.
 BakedScene sphere_over_plane(int order, int channels, bool fixed);
 
+/// Everything that the format can carry, on random geometry: two uv sets, tangents, vertex colours, textures with
+/// transforms, every kind of light and material field.
+BakedScene everything(int order, int channels);
+
 /// One triangle in the plane y = 0 with the given normal at its corners; order and channels as asked, all slots zero.
 BakedScene single_triangle(int order, int channels, bool fixed);
 

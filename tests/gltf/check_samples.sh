@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# check_samples.sh KILN_MAKE_SAMPLE: samples of every kind pass the Khronos validator. Exit 77: cannot run here.
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+command -v node >/dev/null || { echo "SKIPPED: no node"; exit 77; }
+dir=$(mktemp -d)
+trap 'rm -rf "$dir"' EXIT
+"$1" "$dir/sphere.glb" 4 3
+"$1" "$dir/grey.glb" 6 1
+"$1" --everything "$dir/everything.glb" 3 3
+"$1" --everything "$dir/order10.glb" 10 3
+node "$here/validate.mjs" "$dir"/*.glb
