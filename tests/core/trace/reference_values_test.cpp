@@ -81,9 +81,9 @@ Subject load(const std::string& name, std::size_t count) {
   return subject;
 }
 
-/// How far a result is from the values of a file, relative to their mean, over the points and RGB.
+/// How far a result is from the values of a file, relative to their mean, without the worst 1 % of the vertices.
 struct Agreement {
-  double difference = 0;  // RMS without the worst 1 % of the numbers: creases are ill-defined
+  double difference = 0;  // RMS over vertices and RGB
   double own_noise = 0;   // RMS
   double bias = 0;        // signed mean
 };
@@ -91,24 +91,22 @@ struct Agreement {
 Agreement compare(const Subject& subject, const ReferenceResult& ours, const std::string& file) {
   const Bytes bytes = read_file(file);
   const std::vector<Vec3f> theirs = vectors_at(bytes, 0, bytes.size() / sizeof(Vec3f));
-  std::vector<double> squares;
-  double mean = 0, noise = 0, bias = 0;
+  std::vector<Vec3d> differences;
+  double mean = 0, noise = 0;
   for (std::size_t i = 0; i < subject.rows.size(); ++i) {
-    const Vec3d truth = to_double(theirs[subject.rows[i]]);
-    for (std::size_t c = 0; c < 3; ++c) {
-      mean += truth[c];
-      bias += ours.value[i][c] - truth[c];
-      noise += std::pow((ours.half_a[i][c] - ours.half_b[i][c]) / 2, 2);
-      squares.push_back(std::pow(ours.value[i][c] - truth[c], 2));
-    }
+    const Vec3d truth = to_double(theirs[subject.rows[i]]), halves = ours.half_a[i] - ours.half_b[i];
+    mean += truth.x + truth.y + truth.z;
+    noise += dot(halves, halves) / 4;
+    differences.push_back(ours.value[i] - truth);
   }
-  const auto n = static_cast<double>(squares.size());
-  std::sort(squares.begin(), squares.end());
-  squares.resize(squares.size() - squares.size() / 100);
-  double sum = 0;
-  for (const double s : squares) sum += s;
+  const auto n = 3 * static_cast<double>(differences.size());
   mean /= n;
-  return {std::sqrt(sum / static_cast<double>(squares.size())) / mean, std::sqrt(noise / n) / mean, bias / n / mean};
+  std::sort(differences.begin(), differences.end(), [](auto& a, auto& b) { return dot(a, a) < dot(b, b); });
+  differences.resize(differences.size() - differences.size() / 100);
+  double squares = 0, bias = 0;
+  for (const Vec3d& d : differences) squares += dot(d, d), bias += d.x + d.y + d.z;
+  const auto kept = 3 * static_cast<double>(differences.size());
+  return {std::sqrt(squares / kept) / mean, std::sqrt(noise / n) / mean, bias / kept / mean};
 }
 
 struct Case {
@@ -130,8 +128,10 @@ void check(const Case& c) {
   const Agreement a = compare(subject, ours, c.file);
   std::printf("%s: difference %.4f, own noise %.4f, their noise %.4f, bias %+.4f\n", c.file.c_str(), a.difference,
               a.own_noise, c.their_noise, a.bias);
+  // Vertices near creases are ill-defined by about 1 % (README); one vertex in ten is near one.
+  constexpr double kCreases = 0.003;
   const double combined = std::hypot(a.own_noise, c.their_noise);
-  EXPECT_LT(a.difference, 1.3 * combined);  // 900 numbers, some of a point's noise shared between channels
+  EXPECT_LT(a.difference, 1.2 * std::hypot(combined, kCreases));  // 900 numbers, noise shared between channels
   EXPECT_LT(a.own_noise, 4 * c.their_noise);
   // The means of two right tracers differ by their noise over 300 points, and by 0.1 % as the README says.
   EXPECT_LT(std::abs(a.bias), 3 * combined / std::sqrt(double{kPoints}) + 0.001);
