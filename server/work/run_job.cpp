@@ -28,10 +28,11 @@ int status_of(Kind kind) {
   return own_fault ? 422 : 500;
 }
 
-/// The recipe was canonical when it was stored: a fault here is ours.
-Limits limits_of(const std::string& recipe) {
+/// A stored recipe was canonical once; this program may be another one than that which stored it.
+Result<Limits> limits_of(const std::string& recipe) {
   const auto parsed = parse_recipe(recipe);
-  return parsed ? parsed->limits : Limits{};
+  if (!parsed) return fault("internal", "this server does not understand the job's recipe any more");
+  return parsed->limits;
 }
 
 WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const Limits& limits, int threads) {
@@ -111,12 +112,13 @@ class JobRun {
   }
 
   void conclude() {
-    const Limits limits = limits_of(claim_.job.recipe);
+    const auto limits = limits_of(claim_.job.recipe);
+    if (!limits) return fail({limits.error(), 500});
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
     const auto folder = WorkFolder::make(
-        path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, limits, place_.options.threads));
+        path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options.threads));
     if (!folder) return after_trouble(folder.error());
-    end_as(bake(*folder, limits), *folder);
+    end_as(bake(*folder, *limits), *folder);
   }
 
   WorkerOutcome bake(const WorkFolder& folder, const Limits& limits) {
@@ -240,7 +242,7 @@ void run_job(const Claim& claim, StopSignal& stop, const WorkPlace& place) { Job
 
 Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe, const StopSignal& stop,
                              const WorkPlace& place) {
-  const Limits limits = limits_of(recipe);
+  KILN_TRY(limits, limits_of(recipe));
   WorkerOrder order = order_of(inputs, recipe, limits, place.options.threads);
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));

@@ -49,6 +49,7 @@ class ServiceTest : public ::testing::Test {
   Submission submission(const std::string& label) {
     Submission job;
     job.scene_sha256 = put(label == "crash-once" ? (folder_ / "marker").string() : "scene");
+    job.recipe.steps = {PrtStep{}};
     job.recipe.label = label;
     job.recipe.seed = ++seed_;
     return job;
