@@ -21,7 +21,7 @@ std::int64_t now_ms() {
 
 std::string access_line(const AccessEntry& entry) {
   using Json = nlohmann::ordered_json;
-  Json object = {{"time", rfc3339(now_ms())},  {"level", entry.status >= 500 ? "error" : "info"},
+  Json object = {{"time", rfc3339(now_ms())},  {"level", entry.status == 500 || !entry.fault.empty() ? "error" : "info"},
                  {"event", "request"},         {"request_id", capped(entry.request_id)},
                  {"peer", capped(entry.peer)}, {"method", capped(entry.method)},
                  {"path", capped(entry.path)}, {"operation", entry.operation},

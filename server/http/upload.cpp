@@ -120,7 +120,7 @@ Answer<Submission> submission_of_scene(Request& request, Service& service) {
   if (!job) return tl::make_unexpected(job.error());
   AssetRequest asset;
   asset.expected = request.body->length();
-  if (asset.expected == 0) return refuse("malformed_request", "the body is empty: send a scene");
+  if (asset.expected == 0) return refuse("empty_upload", "the body is empty: send a scene");
   auto stored = store_asset(service, asset, from_body(*request.body));
   if (!stored) return tl::make_unexpected(stored.error());
   job->recipe.scene_asset = stored->sha256;

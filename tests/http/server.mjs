@@ -5,8 +5,10 @@ import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 
+/** `--data FOLDER` among the flags: a folder that an earlier server left. */
 export async function startServer(...flags) {
-  const data = mkdtempSync(join(tmpdir(), 'kiln-http-test-'));
+  const given = flags.indexOf('--data');
+  const data = given < 0 ? mkdtempSync(join(tmpdir(), 'kiln-http-test-')) : flags.splice(given, 2)[1];
   const child = spawn(process.env.KILND, ['--data', data, '--port', '0', '--quiet', ...flags], {stdio: ['ignore', 'ignore', 'pipe']});
   let log = '';
   const url = await new Promise((resolve, reject) => {
@@ -20,10 +22,10 @@ export async function startServer(...flags) {
   const exited = new Promise((resolve) => child.on('exit', (code) => resolve(code)));
   return {
     url, data, child, exited, log: () => log,
-    async stop() {
+    async stop({keep = false} = {}) {
       child.kill('SIGTERM');
       const code = await exited;
-      rmSync(data, {recursive: true, force: true});
+      if (!keep) rmSync(data, {recursive: true, force: true});
       return code;
     },
   };

@@ -81,7 +81,7 @@ TEST(Events, OfAllJobsBeginNow) {
 }
 
 TEST(Events, StreamsAreCappedAndFreedWhenTheirClientGoes) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.max_streams = 1;
   RunningServer server(options);
   {

@@ -90,7 +90,7 @@ TEST(Hardening, H6ManyRangesAreRefused) {
 }
 
 TEST(Hardening, H7SlowHeadsDelayNobodyAndEndAtTheirDeadline) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.front.head_deadline = 1500ms;
   const RunningServer server(options);
   std::vector<std::unique_ptr<RawConnection>> slow;
@@ -105,7 +105,7 @@ TEST(Hardening, H7SlowHeadsDelayNobodyAndEndAtTheirDeadline) {
 }
 
 TEST(Hardening, H7AConnectionThatWaitsMakesRoomForAnotherWhenAllAreTaken) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.front.max_connections = 8;
   const RunningServer server(options);
   std::vector<std::unique_ptr<RawConnection>> silent;
@@ -114,7 +114,7 @@ TEST(Hardening, H7AConnectionThatWaitsMakesRoomForAnotherWhenAllAreTaken) {
 }
 
 TEST(Hardening, H7ASlowBodyIsCutWhileOthersAreServed) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.front.pace.idle = 300ms;
   const RunningServer server(options);
   RawConnection slow(server.port());
@@ -124,7 +124,7 @@ TEST(Hardening, H7ASlowBodyIsCutWhileOthersAreServed) {
 }
 
 TEST(Hardening, H7UploadsHaveTheirOwnCap) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.max_uploads = 2;
   const RunningServer server(options);
   const std::string open_upload = "POST /v1/assets HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\nabc";
@@ -276,7 +276,7 @@ TEST(Hardening, AClientThatAsksFirstIsToldToContinueOnlyWhenItsBodyIsWanted) {
 
 TEST(Hardening, APortCannotBeTakenTwice) {
   RunningServer server;
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.port = server.port();
   HttpServer second(options, server.service());
   const auto port = second.bind();

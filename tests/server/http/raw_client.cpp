@@ -93,6 +93,12 @@ std::string request_text(const std::string& method, const std::string& target, c
   return text + "\r\n" + body;
 }
 
+HttpOptions few_threads() {
+  HttpOptions options;
+  options.max_uploads = options.max_streams = options.max_downloads = options.quick_threads = 4;
+  return options;
+}
+
 RunningServer::RunningServer(HttpOptions options) {
   options.port = 0;
   options.log = [this](std::string_view line) {

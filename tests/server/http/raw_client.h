@@ -46,9 +46,12 @@ RawReply parse_reply(const std::string& bytes);
 std::string request_text(const std::string& method, const std::string& target,
                          const std::vector<std::string>& lines = {}, const std::string& body = {});
 
+/// Options of a small server: what is tested does not depend on the number of threads, how long it takes does.
+HttpOptions few_threads();
+
 class RunningServer {
  public:
-  explicit RunningServer(HttpOptions options = {});
+  explicit RunningServer(HttpOptions options = few_threads());
   ~RunningServer();
   int port() const { return port_; }
   FakeService& service() { return service_; }

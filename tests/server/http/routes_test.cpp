@@ -41,7 +41,8 @@ TEST(Jobs, AllMistakesOfADocumentComeTogetherWithPointers) {
       server.post("/v1/jobs", "application/json", R"({"steps":[{"do":"prt","order":99}],"sede":1,"force":"yes"})");
   ASSERT_EQ(reply.status, 422);
   std::set<std::string> pointers;
-  for (const auto& error : json::parse(reply.body)["errors"]) pointers.insert(error["pointer"]);
+  const json problem = json::parse(reply.body);
+  for (const json& error : problem["errors"]) pointers.insert(error["pointer"]);
   EXPECT_TRUE(pointers.contains("/steps/0/order"));
   EXPECT_TRUE(pointers.contains("/sede"));
   EXPECT_TRUE(pointers.contains("/force"));

@@ -27,7 +27,7 @@ void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 TEST(Security, S2OneOfTheTokensOpensAndNothingElseDoes) {
   const std::string token = "Abc_-" + std::string(38, 'z');
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.token_hashes = {sha256_hex({reinterpret_cast<const std::uint8_t*>(token.data()), token.size()})};
   RunningServer server(options);
   const auto status = [&](const std::string& value) {
@@ -97,7 +97,7 @@ TEST(Security, S6NoOriginIsEverAllowed) {
 }
 
 TEST(Security, ANameThatIsNotOursIsMisdirectedWhenNamesAreGiven) {
-  HttpOptions options;
+  HttpOptions options = few_threads();
   options.hosts = loopback_hosts();
   RunningServer server(options);
   EXPECT_EQ(server.raw("GET /healthz HTTP/1.1\r\nHost: evil.example:80\r\n\r\n").status, 421);
