@@ -69,6 +69,12 @@ VertexStream color_stream(std::vector<float> values) {
   return {StreamKind::color, 4, kColorBits, {0, 0, 0, 0}, 1, std::move(values)};
 }
 
+bool uses_uv_set(const Material& m, int set) {
+  const auto uses = [&](const TextureRef& ref) { return ref.texture >= 0 && ref.uv_set == set; };
+  return uses(m.base_color_texture) || uses(m.metallic_roughness_texture) || uses(m.emission_texture) ||
+         uses(m.normal_texture);
+}
+
 class PrimitiveBuilder {
  public:
   PrimitiveBuilder(const BakedScene& baked, std::uint32_t part, PartMesh mesh)
@@ -88,8 +94,8 @@ class PrimitiveBuilder {
                        const Vec3f& n = mesh_.normal[v];
                        return std::array{n.x, n.y, n.z};
                      })});
-    if (part_.has_uv0) add({"TEXCOORD_0"}, texcoord_stream(mesh_.uv0, vertices_, e.texcoord_bits));
-    if (part_.has_uv1) add({"TEXCOORD_1"}, texcoord_stream(mesh_.uv1, vertices_, e.texcoord_bits));
+    add_texcoords(0, part_.has_uv0 ? &mesh_.uv0 : nullptr, e.texcoord_bits);
+    add_texcoords(1, part_.has_uv1 ? &mesh_.uv1 : nullptr, e.texcoord_bits);
     if (part_.has_tangent) {
       add({"TANGENT"}, {StreamKind::generic, 4, kTangentBits, {-1, -1, -1, -1}, 2, gather<4>(vertices_, [&](auto v) {
                           const Vec4f& t = mesh_.tangent[v];
@@ -123,6 +129,16 @@ class PrimitiveBuilder {
     name.components = stream.components;
     out_.names.push_back(std::move(name));
     out_.mesh.streams.push_back(std::move(stream));
+  }
+
+  /// A part without coordinates that its textures ask for gets zeros: so the bake saw it, and the format demands it.
+  void add_texcoords(int set, const std::vector<Vec2f>* uv, int bits) {
+    if (uv) {
+      add({"TEXCOORD_" + std::to_string(set)}, texcoord_stream(*uv, vertices_, bits));
+    } else if (uses_uv_set(baked_.scene.materials[static_cast<std::size_t>(part_.material)], set)) {
+      add({"TEXCOORD_" + std::to_string(set)},
+          {StreamKind::texcoord, 2, bits, {}, 1, std::vector<float>(2 * vertices_.size(), 0.0F)});
+    }
   }
 
   VertexStream original_color(const Vec4f& factor) const {

@@ -32,7 +32,7 @@ struct Encoding {
   int normal_bits = 12;
   int texcoord_bits = 14;
   int coefficient_bits = 12;  // of each _PRT_n slot over its own range
-  int speed = 5;              // Draco 0 (small) .. 10 (fast)
+  int speed = 7;              // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
 };
 
 /// The bytes of a GLB. Draco reorders vertices: what read_baked_glb gives back is the delivered order.

@@ -23,6 +23,9 @@ double number(float x) {
   return out;
 }
 
+/// glTF's factors lie in [0, 1], whatever the input said.
+double factor(float x) { return number(std::clamp(x, 0.0F, 1.0F)); }
+
 json rgb(const Vec3f& c) { return {number(c.x), number(c.y), number(c.z)}; }
 
 /// Offset, rotation and scale of uv' = T R S uv with R = (c s; -s c), as KHR_texture_transform has it.
@@ -46,7 +49,7 @@ json texture_info(const TextureRef& ref, Extensions& used) {
 void put_alpha(const Material& m, json& out) {
   if (m.alpha_mode == AlphaMode::mask) {
     out["alphaMode"] = "MASK";
-    out["alphaCutoff"] = number(m.alpha_cutoff);
+    out["alphaCutoff"] = number(std::max(m.alpha_cutoff, 0.0F));
   }
   if (m.alpha_mode == AlphaMode::blend) out["alphaMode"] = "BLEND";
   if (m.double_sided) out["doubleSided"] = true;
@@ -69,11 +72,11 @@ void put_emission(const Material& m, json& out, Extensions& used) {
 json original_material(const Material& m, Extensions& used) {
   json out{{"name", m.name}};
   json& pbr = out["pbrMetallicRoughness"];
-  pbr["baseColorFactor"] = {number(m.base_color.x), number(m.base_color.y), number(m.base_color.z),
-                            number(m.base_color.w)};
+  pbr["baseColorFactor"] = {factor(m.base_color.x), factor(m.base_color.y), factor(m.base_color.z),
+                            factor(m.base_color.w)};
   if (m.base_color_texture.texture >= 0) pbr["baseColorTexture"] = texture_info(m.base_color_texture, used);
-  pbr["metallicFactor"] = number(m.metallic);
-  pbr["roughnessFactor"] = number(m.roughness);
+  pbr["metallicFactor"] = factor(m.metallic);
+  pbr["roughnessFactor"] = factor(m.roughness);
   if (m.metallic_roughness_texture.texture >= 0) {
     pbr["metallicRoughnessTexture"] = texture_info(m.metallic_roughness_texture, used);
   }
@@ -90,7 +93,7 @@ json original_material(const Material& m, Extensions& used) {
 json unlit_twin(const Material& m, Extensions& used) {
   json out{{"name", m.name + " (baked)"}};
   json& pbr = out["pbrMetallicRoughness"];
-  pbr["baseColorFactor"] = {1, 1, 1, number(m.base_color.w)};
+  pbr["baseColorFactor"] = {1, 1, 1, factor(m.base_color.w)};
   if (m.base_color_texture.texture >= 0) pbr["baseColorTexture"] = texture_info(m.base_color_texture, used);
   pbr["metallicFactor"] = 0;
   put_alpha(m, out);
@@ -151,7 +154,9 @@ json light_json(const Light& light, double scale) {
            {"intensity", std::max(peak, 0.0F) * (distant ? 1 : scale * scale)}};
   if (!distant && light.range > 0) out["range"] = light.range * scale;
   if (light.type == LightType::spot) {
-    out["spot"] = {{"innerConeAngle", number(light.inner_cone)}, {"outerConeAngle", number(light.outer_cone)}};
+    const float outer = std::max(light.outer_cone, 1e-6F);  // glTF asks for 0 <= inner < outer
+    out["spot"] = {{"innerConeAngle", number(std::min(light.inner_cone, outer * 0.999999F))},
+                   {"outerConeAngle", number(outer)}};
   }
   return out;
 }

@@ -30,6 +30,8 @@ void check_shape(const BakedScene& baked) {
   EXPECTS(baked.transfer.channels == 1 || baked.transfer.channels == 3);
   EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
   EXPECTS(mesh.part.size() == mesh.triangles.size());
+  EXPECTS(std::isnormal(baked.exposure) && baked.exposure > 0);
+  EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
 /// The document under construction and its binary chunk.

@@ -1,5 +1,6 @@
 // kiln-make-sample OUT.glb [ORDER [CHANNELS]]             a sphere over a plane as a baked scene
 // kiln-make-sample --everything OUT.glb [ORDER [CHANNELS]]  all that the format can carry
+// kiln-make-sample --import SCENE.gltf OUT.glb            a scene as if under an open sky, without a bake
 
 #include <cstdio>
 #include <fstream>
@@ -25,17 +26,27 @@ int write_sample(const char* path, const kiln::BakedScene& scene) {
   return out.good() ? 0 : 73;
 }
 
+int import_sample(const char* scene_path, const char* out_path) {
+  const auto files = kiln::read_scene_files(scene_path);
+  auto scene = files ? kiln::import_scene(*files) : tl::make_unexpected(files.error());
+  if (scene) return write_sample(out_path, kiln::open_sky(std::move(*scene), 3));
+  std::fprintf(stderr, "%s: %s %s\n", scene.error().code.c_str(), scene.error().where.c_str(),
+               scene.error().message.c_str());
+  return 65;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::span<char*> arguments(argv + 1, static_cast<std::size_t>(argc - 1));
-  const bool everything = !arguments.empty() && std::string(arguments[0]) == "--everything";
-  if (everything) arguments = arguments.subspan(1);
-  if (arguments.empty()) {
-    std::fputs("usage: kiln-make-sample [--everything] OUT.glb [ORDER [CHANNELS]]\n", stderr);
+  const std::string mode = !arguments.empty() && arguments[0][0] == '-' ? arguments[0] : "";
+  if (!mode.empty()) arguments = arguments.subspan(1);
+  if (arguments.size() < (mode == "--import" ? 2u : 1u)) {
+    std::fputs("usage: kiln-make-sample [--everything | --import SCENE.gltf] OUT.glb [ORDER [CHANNELS]]\n", stderr);
     return 64;
   }
+  if (mode == "--import") return import_sample(arguments[0], arguments[1]);
   const int order = number_or(arguments, 1, 4), channels = number_or(arguments, 2, 3);
-  return write_sample(arguments[0],
-                      everything ? kiln::everything(order, channels) : kiln::sphere_over_plane(order, channels, true));
+  return write_sample(arguments[0], mode == "--everything" ? kiln::everything(order, channels)
+                                                           : kiln::sphere_over_plane(order, channels, true));
 }

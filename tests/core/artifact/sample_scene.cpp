@@ -127,11 +127,25 @@ BakedScene sphere_over_plane(int order, int channels, bool fixed) {
   return out;
 }
 
+BakedScene open_sky(Scene scene, int order) {
+  BakedScene out;
+  out.scene = std::move(scene);
+  out.transfer = {order, 1, false, {}};
+  out.transfer.coefficients.resize(out.scene.mesh.position.size() * out.transfer.stride());
+  for (std::size_t v = 0; v < out.scene.mesh.position.size(); ++v) {
+    clamped_cosine_transfer(order, out.scene.mesh.normal[v], &out.transfer.coefficients[v * out.transfer.stride()]);
+  }
+  out.light = {"soft sky", soft_sky(order)};
+  out.exposure = automatic_exposure(out.scene.mesh, baked_colors(out));
+  return out;
+}
+
 BakedScene everything(int order, int channels) {
   BakedScene out = random_baked({.order = order, .channels = channels, .fixed = true});
   Scene& scene = out.scene;
   scene.images = {checker(), {"lost", "image/jpeg", {}, 0, 0, {}}};
   scene.textures = {{0, Wrap::mirror, Wrap::clamp, true}, {1, Wrap::repeat, Wrap::repeat, false}};
+  scene.materials[0].base_color_texture.texture = 0;  // part 0 has no texture coordinates for it
   Material& m = scene.materials[1];
   m.base_color_texture = {0, 0, {0, 2, 0.5F, -3, 0, 0.25F}, 1};  // a quarter turn, scaled by 3 and 2
   m.metallic_roughness_texture.texture = m.emission_texture.texture = 1;

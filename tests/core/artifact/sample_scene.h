@@ -13,6 +13,9 @@ BakedScene sphere_over_plane(int order, int channels, bool fixed);
 /// transforms, every kind of light and material field.
 BakedScene everything(int order, int channels);
 
+/// Any scene as if nothing stood in the way of the sky: grey clamped-cosine transfer under a soft sky.
+BakedScene open_sky(Scene, int order);
+
 /// One triangle in the plane y = 0 with the given normal at its corners; order and channels as asked, all slots zero.
 BakedScene single_triangle(int order, int channels, bool fixed);
 
