@@ -50,6 +50,11 @@ Result<HttpOptions> http_options(const DaemonOptions& options) {
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
   if (!options.token_file.empty()) {
+    auto hashes = read_token_hashes(options.token_file);
+    if (!hashes) return tl::make_unexpected(hashes.error());
+    http.token_hashes = std::move(*hashes);
+  }
+  if (!options.token_file.empty()) {
     KILN_TRY(hashes, read_token_hashes(options.token_file));
     http.token_hashes = std::move(hashes);
   }

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
@@ -49,11 +50,19 @@ class KillTest : public ::testing::Test {
   }
 
   void start() {
+    const std::lock_guard lock(mutex_);
     daemon_.reset();
     daemon_ =
         std::make_unique<Daemon>(KILN_DAEMON, folder_ / "data",
                                  std::vector<std::string>{"--workers", "2", "--threads", "1", "--first-retry-s", "0.1",
                                                           "--soft-free-percent", "0", "--hard-free-percent", "0"});
+  }
+
+  /// From any thread, at any moment: whoever speaks to the server finds it gone and starts it again.
+  void kill_server() {
+    const std::lock_guard lock(mutex_);
+    ::kill(daemon_->pid(), SIGKILL);
+    ++server_kills_;
   }
 
   /// Submits until the server answers; the idempotency key makes a second try the same job.
@@ -62,8 +71,8 @@ class KillTest : public ::testing::Test {
       const Answer answer = http_post(daemon_->port(), "/v1/jobs", cube_job(scene_, seed),
                                       {{"Idempotency-Key", "cube-" + std::to_string(seed)}});
       if (answer.status == 200 || answer.status == 202) return json::parse(answer.body).at("id");
-      ADD_FAILURE() << "submit answered " << answer.status << " " << answer.body;
-      std::this_thread::sleep_for(20ms);
+      EXPECT_EQ(answer.status, 0) << answer.body;
+      start();
     }
     return {};
   }
@@ -76,6 +85,7 @@ class KillTest : public ::testing::Test {
 
   /// Kills one worker whose job was not hit before: a second crash would rightly fail it.
   bool kill_a_worker() {
+    const std::lock_guard lock(mutex_);
     for (const auto& [pid, id] : daemon_->workers()) {
       if (!hit_.insert(id).second) continue;
       ::kill(pid, SIGKILL);
@@ -102,27 +112,32 @@ class KillTest : public ::testing::Test {
   std::unique_ptr<Daemon> daemon_;
   std::string scene_;
   std::set<std::string> hit_;
+  std::mutex mutex_;  // of daemon_ while another thread may kill it
+  int server_kills_ = 0;
 };
 
 TEST_F(KillTest, NoAcknowledgedJobIsLostWhoeverIsKilled) {
-  std::mt19937 random(kSeed);
-  std::uniform_int_distribution<int> pause_ms(5, 150);
   const auto deadline = Clock::now() + 50s;
+  int worker_kills = 0;
+  std::jthread killer([&](const std::stop_token& over) {
+    std::mt19937 random(kSeed);
+    std::uniform_int_distribution<int> pause_ms(5, 250);
+    while (!over.stop_requested() && (server_kills_ < kServerKills || worker_kills < kWorkerKills)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(pause_ms(random)));
+      if (worker_kills < kWorkerKills && kill_a_worker()) ++worker_kills;
+      if (server_kills_ < kServerKills && random() % 3 == 0) kill_server();
+    }
+  });
   std::vector<std::string> acknowledged;
-  int server_kills = 0, worker_kills = 0;
-  while (static_cast<int>(acknowledged.size()) < kJobs || server_kills < kServerKills) {
-    ASSERT_LT(Clock::now(), deadline) << "too slow: " << acknowledged.size() << " jobs";
-    for (int i = 0; i < 4 && static_cast<int>(acknowledged.size()) < kJobs; ++i) {
-      acknowledged.push_back(submit(static_cast<int>(acknowledged.size())));
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(pause_ms(random)));
-    if (worker_kills < kWorkerKills && random() % 2 == 0 && kill_a_worker()) ++worker_kills;
-    if (server_kills < kServerKills && random() % 3 == 0) {
-      daemon_->kill_hard();
-      start();
-      ++server_kills;
-    }
+  for (int seed = 0; seed < kJobs; ++seed) {
+    ASSERT_LT(Clock::now(), deadline) << "too slow: " << seed << " jobs";
+    acknowledged.push_back(submit(seed));
+    if (seed >= 8) http_get(daemon_->port(), "/v1/jobs/" + acknowledged[acknowledged.size() - 8] + "?wait=1");
   }
+  killer.request_stop();
+  killer.join();
+  if (http_get(daemon_->port(), "/healthz").status == 0) start();
+  EXPECT_GT(server_kills_, 0);
   EXPECT_GT(worker_kills, 0);
 
   for (const std::string& id : acknowledged) {
@@ -146,7 +161,7 @@ TEST_F(KillTest, NoAcknowledgedJobIsLostWhoeverIsKilled) {
     text << in.rdbuf();
     EXPECT_EQ(sha256_of(text.str()), file.path().filename());
   }
-  std::printf("{\"jobs\":%d,\"server_kills\":%d,\"worker_kills\":%d}\n", kJobs, server_kills, worker_kills);
+  std::printf("{\"jobs\":%d,\"server_kills\":%d,\"worker_kills\":%d}\n", kJobs, server_kills_, worker_kills);
 }
 
 TEST_F(KillTest, TermPutsRunningJobsBackAndTheNextStartFinishesThem) {

@@ -16,7 +16,10 @@ using namespace std::chrono_literals;
 class ServiceTest : public ::testing::Test {
  protected:
   ServiceTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "kiln_service.XXXXXX").string();
+    // In memory where that is possible: durability has tests of its own.
+    const bool memory = std::filesystem::is_directory("/dev/shm");
+    const auto place = memory ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path();
+    std::string name = (place / "kiln_service.XXXXXX").string();
     folder_ = ::mkdtemp(name.data());
     options_.data = folder_ / "data";
     options_.worker_command = {KILN_FAKE_WORKER};
