@@ -21,12 +21,13 @@ std::int64_t now_ms() {
 
 std::string access_line(const AccessEntry& entry) {
   using Json = nlohmann::ordered_json;
-  Json object = {{"time", rfc3339(now_ms())},  {"level", entry.status == 500 || !entry.fault.empty() ? "error" : "info"},
-                 {"event", "request"},         {"request_id", capped(entry.request_id)},
-                 {"peer", capped(entry.peer)}, {"method", capped(entry.method)},
-                 {"path", capped(entry.path)}, {"operation", entry.operation},
-                 {"status", entry.status},     {"bytes", entry.bytes},
-                 {"seconds", entry.seconds}};
+  Json object = {
+      {"time", rfc3339(now_ms())},  {"level", entry.status == 500 || !entry.fault.empty() ? "error" : "info"},
+      {"event", "request"},         {"request_id", capped(entry.request_id)},
+      {"peer", capped(entry.peer)}, {"method", capped(entry.method)},
+      {"path", capped(entry.path)}, {"operation", entry.operation},
+      {"status", entry.status},     {"bytes", entry.bytes},
+      {"seconds", entry.seconds}};
   if (!entry.fault.empty()) object["fault"] = capped(entry.fault);
   return object.dump(-1, ' ', true, Json::error_handler_t::replace);
 }

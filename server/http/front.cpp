@@ -6,15 +6,15 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
-#include <list>
 #include <mutex>
 #include <optional>
 #include <thread>
-#include <unordered_map>
 #include <vector>
 
+#include "server/http/guest_book.h"
 #include "server/http/listener.h"
 #include "server/http/work_queue.h"
 
@@ -25,17 +25,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kDiscardLimit = 16u << 20;  // bytes thrown away after a reply before the connection is cut
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-
-enum class Stage { reading, serving, lingering };
-
-struct Guest {
-  Peer peer;
-  Stage stage = Stage::reading;
-  std::string bytes;
-  std::size_t discarded = 0;
-  Clock::time_point deadline;
-  std::list<int>::iterator place;  // in the list of its stage
-};
 
 bool is_resource_shortage(int error) {
   return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
@@ -53,10 +42,7 @@ struct Front::State {
   std::atomic<bool> draining{false};
 
   // The epoll thread's own.
-  std::unordered_map<int, Guest> guests;
-  std::unordered_map<std::string, std::size_t> per_address;
-  std::list<int> reading, lingering;  // oldest first; every stage has one constant duration, so also by deadline
-  std::size_t serving = 0;
+  GuestBook guests;
   std::optional<Clock::time_point> accept_again;
   std::optional<Clock::time_point> cut_at;
 
@@ -94,28 +80,8 @@ struct Front::State {
 
   // --- a guest's way: reading -> serving -> lingering -> gone
 
-  void leave_stage(Guest& guest) {
-    if (guest.stage == Stage::reading) reading.erase(guest.place);
-    if (guest.stage == Stage::lingering) lingering.erase(guest.place);
-    if (guest.stage == Stage::serving) --serving;
-  }
-
-  void drop(int fd) {
-    const auto found = guests.find(fd);
-    leave_stage(found->second);
-    const auto address = per_address.find(found->second.peer.address);
-    if (--address->second == 0) per_address.erase(address);
-    guests.erase(found);
-    ::close(fd);
-  }
-
   void linger(int fd) {
-    Guest& guest = guests.at(fd);
-    leave_stage(guest);
-    guest.bytes = {};
-    guest.stage = Stage::lingering;
-    guest.deadline = Clock::now() + options.linger;
-    guest.place = lingering.insert(lingering.end(), fd);
+    guests.linger(fd, options.linger);
     shutdown(fd, SHUT_WR);
   }
 
@@ -126,25 +92,23 @@ struct Front::State {
   }
 
   void admit(int fd, const Peer& peer) {
-    std::size_t& from_there = per_address[peer.address];
-    if (!peer.loopback && from_there >= options.max_per_address) {
+    if (!peer.loopback && guests.from(peer.address) >= options.max_per_address) {
       count([](FrontStats& s) { ++s.over_address_cap; });
       ::close(fd);
       return;
     }
-    ++from_there;
-    Guest& guest = guests[fd];
-    guest.peer = peer;
-    guest.deadline = Clock::now() + options.head_deadline;
-    guest.place = reading.insert(reading.end(), fd);
+    guests.enter(fd, peer, options.head_deadline);
     watch(fd);
     count([](FrontStats& s) { ++s.accepted; });
   }
 
+  /// Whoever has been answered, or has waited longest for its own head, makes room.
   bool make_room() {
     if (guests.size() < options.max_connections) return true;
-    if (reading.empty() && lingering.empty()) return false;
-    drop(lingering.empty() ? reading.front() : lingering.front());
+    const int lingering = guests.oldest(Stage::lingering);
+    const int reading = guests.oldest(Stage::reading);
+    if (lingering < 0 && reading < 0) return false;
+    guests.drop(lingering < 0 ? reading : lingering);
     count([](FrontStats& s) { ++s.evicted; });
     return true;
   }
@@ -170,30 +134,27 @@ struct Front::State {
       if (error == EAGAIN || error == EWOULDBLOCK) return;
       if (error == EINTR || error == ECONNABORTED) continue;
       count([](FrontStats& s) { ++s.accept_errors; });
-      if (is_resource_shortage(error) && !reading.empty()) drop(reading.front());
+      if (is_resource_shortage(error) && guests.reading() > 0) guests.drop(guests.oldest(Stage::reading));
       return pause_accepting();
     }
   }
 
   void hand_over(int fd, std::size_t head_size) {
-    Guest& guest = guests.at(fd);
+    Guest& guest = *guests.find(fd);
     HeadJob job{fd, guest.peer.address, std::move(guest.bytes), head_size};
     unwatch(fd);
-    leave_stage(guest);
-    guest.stage = Stage::serving;
-    ++serving;
+    guests.serve(fd);
     if (queue.push(job)) return;
     count([](FrontStats& s) { ++s.queue_full; });
     watch(fd);
     refuse_now(fd, make_problem("overloaded", "too many requests wait already; try again in a moment"));
   }
 
-  void read_head(int fd) {
-    Guest& guest = guests.at(fd);
+  void read_head(int fd, Guest& guest) {
     std::array<char, 16384> piece;
     const ssize_t got = recv(fd, piece.data(), piece.size(), 0);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
-    if (got <= 0) return drop(fd);
+    if (got <= 0) return guests.drop(fd);
     const std::size_t searched = guest.bytes.size() < 3 ? 0 : guest.bytes.size() - 3;
     guest.bytes.append(piece.data(), static_cast<std::size_t>(got));
     const std::size_t end = guest.bytes.find("\r\n\r\n", searched);
@@ -204,13 +165,12 @@ struct Front::State {
                                 "a request head may have " + std::to_string(options.head_bytes) + " bytes"));
   }
 
-  void discard(int fd) {
-    Guest& guest = guests.at(fd);
+  void discard(int fd, Guest& guest) {
     std::array<char, 65536> piece;
     const ssize_t got = recv(fd, piece.data(), piece.size(), 0);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
     guest.discarded += got > 0 ? static_cast<std::size_t>(got) : 0;
-    if (got <= 0 || guest.discarded > kDiscardLimit) drop(fd);
+    if (got <= 0 || guest.discarded > kDiscardLimit) guests.drop(fd);
   }
 
   void take_back() {
@@ -223,7 +183,7 @@ struct Front::State {
     }
     for (const Returned& one : now) {
       if (one.complete) {
-        drop(one.fd);
+        guests.drop(one.fd);
       } else {
         linger(one.fd);
         watch(one.fd);
@@ -233,12 +193,15 @@ struct Front::State {
 
   // --- the clock
 
+  bool is_over(int fd, Clock::time_point now) { return fd >= 0 && guests.find(fd)->deadline <= now; }
+
   void expire(Clock::time_point now) {
-    while (!reading.empty() && guests.at(reading.front()).deadline <= now) {
+    for (int fd = guests.oldest(Stage::reading); is_over(fd, now); fd = guests.oldest(Stage::reading)) {
       count([](FrontStats& s) { ++s.head_timeouts; });
-      refuse_now(reading.front(), make_problem("timeout", "the request head did not come in time"));
+      refuse_now(fd, make_problem("timeout", "the request head did not come in time"));
     }
-    while (!lingering.empty() && guests.at(lingering.front()).deadline <= now) drop(lingering.front());
+    for (int fd = guests.oldest(Stage::lingering); is_over(fd, now); fd = guests.oldest(Stage::lingering))
+      guests.drop(fd);
     if (accept_again && *accept_again <= now && listener.fd >= 0) {
       accept_again.reset();
       watch(listener.fd);
@@ -246,15 +209,14 @@ struct Front::State {
     if (cut_at && *cut_at <= now) cut_serving();
   }
 
+  /// Until the next thing that happens by itself; -1: nothing does.
   int sleep_ms(Clock::time_point now) const {
-    std::optional<Clock::time_point> next = accept_again;
-    const auto consider = [&](Clock::time_point t) { next = next ? std::min(*next, t) : t; };
-    if (!reading.empty()) consider(guests.at(reading.front()).deadline);
-    if (!lingering.empty()) consider(guests.at(lingering.front()).deadline);
-    if (cut_at) consider(*cut_at);
+    std::optional<Clock::time_point> next;
+    for (const auto& moment : {guests.next_deadline(), accept_again, cut_at})
+      if (moment && (!next || *moment < *next)) next = moment;
     if (!next) return -1;
-    return static_cast<int>(
-        std::max<std::int64_t>(0, std::chrono::duration_cast<std::chrono::milliseconds>(*next - now).count() + 1));
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(*next - now).count() + 1;
+    return static_cast<int>(std::max<std::int64_t>(0, left));
   }
 
   // --- the end
@@ -267,15 +229,14 @@ struct Front::State {
   }
 
   void cut_serving() {
-    for (const auto& [fd, guest] : guests)
-      if (guest.stage == Stage::serving) shutdown(fd, SHUT_RDWR);
+    for (const int fd : guests.all_serving()) shutdown(fd, SHUT_RDWR);
     cut_at.reset();
   }
 
   void publish_stats() {
     count([this](FrontStats& s) {
       s.connections = guests.size();
-      s.serving = serving;
+      s.serving = guests.serving();
       s.queued = queue.size();
     });
   }
@@ -289,11 +250,11 @@ struct Front::State {
         take_back();
       } else if (fd == listener.fd) {
         accept_some();
-      } else if (const auto guest = guests.find(fd); guest != guests.end()) {  // else dropped in this very turn
-        if (guest->second.stage == Stage::reading)
-          read_head(fd);
-        else if (guest->second.stage == Stage::lingering)
-          discard(fd);
+      } else if (Guest* guest = guests.find(fd)) {  // else it was dropped in this very turn
+        if (guest->stage == Stage::reading)
+          read_head(fd, *guest);
+        else if (guest->stage == Stage::lingering)
+          discard(fd, *guest);
       }
     }
     expire(Clock::now());
@@ -329,7 +290,6 @@ Front::Front(FrontOptions options, ServeHead serve)
 }
 
 Front::~Front() {
-  for (const auto& [fd, guest] : state_->guests) ::close(fd);
   for (const int fd : {state_->listener.fd, state_->epoll, state_->wake})
     if (fd >= 0) ::close(fd);
 }
@@ -347,7 +307,7 @@ void Front::run() {
   s.watch(s.wake);
   s.watch(s.listener.fd);
   bool drain_begun = false;
-  while (!drain_begun || s.serving > 0 || !s.reading.empty()) {
+  while (!drain_begun || s.guests.serving() > 0 || s.guests.reading() > 0) {
     s.turn();
     if (s.draining.load() && !std::exchange(drain_begun, true)) s.begin_drain();
   }

@@ -56,7 +56,7 @@ struct HttpServer::State {
         uploads(options.max_uploads),
         streams(options.max_streams),
         downloads(options.max_downloads),
-        context{s, streams, downloads, draining, [this] { return metrics_text(); }},
+        context{s, streams, downloads, draining, options.heartbeat, [this] { return metrics_text(); }},
         exchange({options.max_upload_bytes, options.hosts, options.token_hashes}, Router(all_routes(context)),
                  viewer_file, uploads, metrics, options.log),
         front(front_options(options), [this](Connection& connection, std::string_view head, const std::string& peer) {

@@ -25,7 +25,8 @@ struct HttpOptions {
   int max_uploads = 16;
   int max_streams = 48;  // event streams and long polls
   int max_downloads = 16;
-  int quick_threads = 16;                 // beside those
+  int quick_threads = 16;                       // beside those
+  std::chrono::milliseconds heartbeat{10'000};  // longest silence of an event stream
   std::vector<std::string> hosts;         // names a Host field may have; empty: any. A local server should list its own
   std::vector<std::string> token_hashes;  // from read_token_hashes (auth.h); empty: nobody is asked
   LogLine log = log_to_stderr;            // one JSON line per request; empty: none

@@ -2,6 +2,7 @@
 // The handlers of all endpoints, a file for each tag of the table.
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 
 #include "server/http/gate.h"
@@ -16,6 +17,7 @@ struct RouteContext {
   Gate& streams;    // event streams and long polls
   Gate& downloads;  // artefacts and bundles
   const std::atomic<bool>& draining;
+  std::chrono::milliseconds heartbeat{10'000};  // longest silence of an event stream
   std::function<std::string()> metrics_text;
 };
 

@@ -11,7 +11,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr Millis kSlice{250};  // how late a stream notices that its client is gone
-constexpr std::chrono::seconds kHeartbeat{10};
 
 /// The job as it was right after the event: its state is the event's, and results appear with the end only.
 std::string job_at_event(Service& service, const JobEvent& event) {
@@ -56,7 +55,7 @@ void send_events(RouteContext& context, EventStream& events, bool one_job, Sink&
       last = Clock::now();
     } else if (events.closed()) {
       return;
-    } else if (Clock::now() - last >= kHeartbeat) {
+    } else if (Clock::now() - last >= context.heartbeat) {
       if (!sink.write(": heartbeat\n\n")) return;
       last = Clock::now();
     }

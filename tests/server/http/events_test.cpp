@@ -104,6 +104,15 @@ TEST(Events, StreamsAreCappedAndFreedWhenTheirClientGoes) {
   EXPECT_TRUE(open);
 }
 
+TEST(Events, ASilentStreamBeatsSoThatADeadClientIsNoticed) {
+  HttpOptions options = few_threads();
+  options.heartbeat = 100ms;
+  RunningServer server(options);
+  RawConnection stream(server.port());
+  stream.send(request_text("GET", "/v1/events"));
+  EXPECT_NE(stream.read_until(": heartbeat\n\n: heartbeat\n\n").find(": heartbeat\n\n: heartbeat"), std::string::npos);
+}
+
 TEST(Events, OfAnUnknownJobAre404AndOddIdsAreRefused) {
   RunningServer server;
   EXPECT_EQ(server.get("/v1/jobs/none/events").status, 404);

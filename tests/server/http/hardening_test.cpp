@@ -1,6 +1,7 @@
 // reliability.md 3.1: what a stranger may throw at the port. H-numbers are those of its table.
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -247,6 +248,46 @@ TEST(Hardening, H17H18PathsReachOnlyEmbeddedFiles) {
   expect_refusal(server.get("/index.html%00.png"), 400, "malformed_request");
   expect_refusal(server.get("/%zz"), 400, "malformed_request");
   expect_refusal(server.get("/%ff"), 400, "malformed_request");
+}
+
+TEST(Hardening, H19ADownloadThatNobodyReadsIsCutAndItsPlaceIsFree) {
+  HttpOptions options = few_threads();
+  options.max_downloads = 1;
+  options.front.pace.idle = 300ms;
+  RunningServer server(options);
+  const std::string id = server.make_job();
+  server.service().succeed(id, {{"scene.glb", std::string(64 << 20, 'x')}});  // more than both sockets buffer
+  const std::string request = request_text("GET", "/v1/jobs/" + id + "/artifacts/scene.glb", {"Range: bytes=0-"});
+  RawConnection lazy(server.port());
+  lazy.send(request);
+  lazy.read_until("\r\n\r\n");
+  const std::string small = request_text("GET", "/v1/jobs/" + id + "/artifacts/scene.glb", {"Range: bytes=0-1"});
+  EXPECT_EQ(server.raw(small).status, 503);
+  RawReply later;
+  for (int tries = 0; tries < 200 && later.status != 206; ++tries) {
+    std::this_thread::sleep_for(50ms);
+    later = server.raw(small);
+  }
+  EXPECT_EQ(later.body, "xx");
+}
+
+TEST(Hardening, H20TheListenerSurvivesWhenDescriptorsRunOut) {
+  RunningServer server(few_threads());
+  int used = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) ++used;
+  rlimit before{};
+  getrlimit(RLIMIT_NOFILE, &before);
+  rlimit small = before;
+  small.rlim_cur = static_cast<rlim_t>(used + 40);
+  setrlimit(RLIMIT_NOFILE, &small);
+  std::vector<std::unique_ptr<RawConnection>> clients;
+  for (int i = 0; i < 35; ++i) clients.push_back(std::make_unique<RawConnection>(server.port()));
+  std::this_thread::sleep_for(300ms);  // the server runs into the limit meanwhile
+  clients.resize(5);
+  EXPECT_EQ(server.get("/healthz").status, 200);
+  setrlimit(RLIMIT_NOFILE, &before);
+  const std::string metrics = server.get("/metrics").body;
+  EXPECT_EQ(metrics.find("kiln_http_accept_errors_total 0\n"), std::string::npos);
 }
 
 TEST(Hardening, ABodyThatEndsEarlyIsRefusedAndLeavesNoFile) {

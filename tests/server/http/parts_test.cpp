@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/base/random.h"
 #include "server/http/multipart.h"
 #include "server/http/parse_head.h"
 #include "server/http/router.h"
@@ -39,6 +40,44 @@ TEST(ParseHead, DecodesPathAndQuery) {
   EXPECT_EQ(head->path, "/a b/\xC3\xA9");
   EXPECT_EQ(head->params, (QueryParams{{"x", "1 2"}, {"y", "&"}, {"z", ""}}));
   EXPECT_EQ(field_of(*head, "accept"), "a");
+}
+
+TEST(ParseHead, WhateverIsAcceptedHasOnePathOneLengthAndNoControlBytes) {
+  const std::string good =
+      "PUT /v1/jobs?preset=prt&label=%C3%A9 HTTP/1.1\r\nHost: a\r\nContent-Length: 12\r\nX-Y: z%20\r\nRange: "
+      "bytes=0-1\r\n\r\n";
+  const std::string spice = std::string("\r\n\0\t %:?&=/#\x7f\xff\xc3", 16) + "0aAhH";
+  int accepted = 0;
+  for (std::uint64_t round = 0; round < 50'000; ++round) {
+    Random random(1, round);
+    std::string text = good;
+    const int changes = 1 + static_cast<int>(random.next() % 4);
+    for (int i = 0; i < changes; ++i) {
+      const std::size_t at = random.next() % text.size();
+      const char c = spice[random.next() % spice.size()];
+      if (random.next() % 3 == 0)
+        text.insert(at, 1, c);
+      else if (random.next() % 2 == 0)
+        text.erase(at, 1 + random.next() % 3);
+      else
+        text[at] = c;
+      if (text.empty()) text = "x";
+    }
+    const auto head = parse_head(text);
+    if (!head) continue;
+    ++accepted;
+    const auto clean = [](const std::string& value) {
+      return std::none_of(value.begin(), value.end(),
+                          [](char c) { return (c >= 0 && c < ' ' && c != '\t') || c == 0x7f; });
+    };
+    ASSERT_TRUE(head->path.starts_with('/') && clean(head->path)) << text;
+    for (const auto& [name, value] : head->params) ASSERT_TRUE(clean(name) && clean(value)) << text;
+    for (const Field& field : head->fields)
+      ASSERT_TRUE(!field.name.empty() && clean(field.name) && clean(field.value)) << text;
+    ASSERT_LE(count_fields(*head, "content-length"), 1U) << text;
+    ASSERT_EQ(count_fields(*head, "transfer-encoding"), 0U) << text;
+  }
+  EXPECT_GT(accepted, 1000);  // the loop looked at something
 }
 
 TEST(PercentDecode, RefusesBrokenEscapesControlBytesAndFalseUtf8) {
