@@ -246,14 +246,27 @@ void BlobStore::release_name(const std::string& sha256) {
 }
 
 Result<StoredBlob> BlobStore::publish(const fs::path& tmp, const std::string& sha256, std::uint64_t bytes) {
-  const fs::path target = path_of(sha256);
-  const bool existed = exists(sha256);
-  if (files_->rename(tmp, target) != 0) return io_fault(errno, "name a blob");
-  if (auto synced = sync_folder(*files_, target.parent_path()); !synced) return tl::make_unexpected(synced.error());
-  return StoredBlob{sha256, bytes, existed};
+  const StoredBlob blob{sha256, bytes, exists(sha256)};
+  if (auto named = name(tmp, blob); !named) return tl::make_unexpected(named.error());
+  if (auto synced = sync_shelves({&blob, 1}); !synced) return tl::make_unexpected(synced.error());
+  return blob;
 }
 
-Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
+Result<void> BlobStore::name(const fs::path& tmp, const StoredBlob& blob) {
+  if (files_->rename(tmp, path_of(blob.sha256)) != 0) return io_fault(errno, "name a blob");
+  return {};
+}
+
+Result<void> BlobStore::sync_shelves(std::span<const StoredBlob> blobs) {
+  std::set<fs::path> shelves;
+  for (const StoredBlob& blob : blobs) shelves.insert(path_of(blob.sha256).parent_path());
+  for (const fs::path& shelf : shelves) {
+    if (auto synced = sync_folder(*files_, shelf); !synced) return synced;
+  }
+  return {};
+}
+
+Result<StoredBlob> BlobStore::seal(const fs::path& file) const {
   const int fd = retry_interrupted([&] { return files_->open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK); });
   if (fd < 0 && (errno == ENOENT || errno == ELOOP)) return fault("not_found", "there is no such result");
   if (fd < 0) return io_fault(errno, "open a result");
@@ -270,7 +283,23 @@ Result<StoredBlob> BlobStore::adopt(const fs::path& file) {
   if (done && files_->fsync(fd) != 0) done = io_fault(errno, "make a result durable");
   files_->close(fd);
   if (!done) return tl::make_unexpected(done.error());
-  return publish(file, hash.hex(), bytes);
+  const std::string sha256 = hash.hex();
+  return StoredBlob{sha256, bytes, exists(sha256)};
+}
+
+Result<std::vector<StoredBlob>> BlobStore::adopt(std::span<const fs::path> files) {
+  // All bytes, then all names, then all shelves: a journal then commits once for the names and not once for each.
+  std::vector<StoredBlob> blobs;
+  for (const fs::path& file : files) {
+    auto sealed = seal(file);
+    if (!sealed) return tl::make_unexpected(sealed.error());
+    blobs.push_back(std::move(*sealed));
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (auto named = name(files[i], blobs[i]); !named) return tl::make_unexpected(named.error());
+  }
+  if (auto synced = sync_shelves(blobs); !synced) return tl::make_unexpected(synced.error());
+  return blobs;
 }
 
 Result<BlobReader> BlobStore::open_blob(const std::string& sha256) const {

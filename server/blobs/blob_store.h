@@ -83,8 +83,9 @@ class BlobStore {
   /// How much of an interrupted named upload is kept.
   std::uint64_t partial_bytes(const std::string& sha256) const;
 
-  /// Moves a finished file (same file system, closed by its writer) into the store.
-  Result<StoredBlob> adopt(const std::filesystem::path& file);
+  /// Moves finished files (same file system, closed by their writer) into the store, in their order. Fails with
+  /// not_found for what is no regular file.
+  Result<std::vector<StoredBlob>> adopt(std::span<const std::filesystem::path> files);
 
   Result<BlobReader> open_blob(const std::string& sha256) const;
   bool exists(const std::string& sha256) const;
@@ -103,6 +104,9 @@ class BlobStore {
   struct State;
   BlobStore(std::filesystem::path root, FileLayer& files);
   Result<StoredBlob> publish(const std::filesystem::path& tmp, const std::string& sha256, std::uint64_t bytes);
+  Result<void> name(const std::filesystem::path& tmp, const StoredBlob&);
+  Result<void> sync_shelves(std::span<const StoredBlob>);
+  Result<StoredBlob> seal(const std::filesystem::path& file) const;
   void release_name(const std::string& sha256);
   int remove_tmp(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
   std::filesystem::path root_;

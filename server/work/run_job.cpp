@@ -153,14 +153,17 @@ class JobRun {
 
   void store_results(const WorkerOutcome& outcome, const WorkFolder& folder) {
     const std::shared_lock gate(place_.blob_gate);
+    std::vector<std::filesystem::path> files;
+    for (const WorkerArtifact& named : outcome.artifacts) files.push_back(folder.result(named.name));
+    const auto stored = place_.blobs.adopt(files);
+    if (!stored && stored.error().code == "not_found") {
+      return fail({{"internal", "the worker named a result that it did not make", ""}, 500});
+    }
+    if (!stored) return after_trouble(stored.error());
     std::vector<Artifact> artifacts;
-    for (const WorkerArtifact& named : outcome.artifacts) {
-      const auto stored = place_.blobs.adopt(folder.result(named.name));
-      if (!stored && stored.error().code == "not_found") {
-        return fail({{"internal", "the worker named a result that it did not make", ""}, 500});
-      }
-      if (!stored) return after_trouble(stored.error());
-      artifacts.push_back({named.name, named.media_type, stored->sha256, stored->bytes});
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const WorkerArtifact& named = outcome.artifacts[i];
+      artifacts.push_back({named.name, named.media_type, (*stored)[i].sha256, (*stored)[i].bytes});
     }
     if (artifacts.empty()) return fail({{"internal", "the worker made no result", ""}, 500});
     succeed(artifacts, false);

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 
@@ -57,7 +58,8 @@ class Watch {
     if (const auto* progress = std::get_if<ProgressEvent>(&*line)) {
       if (!ended_by_us() && news_.progress) news_.progress(*progress);
     } else if (const auto* artifact = std::get_if<WorkerArtifact>(&*line)) {
-      if (!is_artifact_name(artifact->name) || outcome_.artifacts.size() >= 64) {
+      const bool again = std::ranges::count(outcome_.artifacts, artifact->name, &WorkerArtifact::name) > 0;
+      if (again || !is_artifact_name(artifact->name) || outcome_.artifacts.size() >= 64) {
         return end(Kind::internal, {"internal", "the worker named an impossible result", ""}, SIGKILL);
       }
       outcome_.artifacts.push_back(*artifact);

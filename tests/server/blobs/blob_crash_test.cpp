@@ -18,7 +18,11 @@ class BlobCrash : public BlobTest, public ::testing::WithParamInterface<Way> {
   Result<StoredBlob> put(BlobStore& store) const {
     if (GetParam() == Way::adoption) {
       std::ofstream(folder_ / "result") << kText;
-      return store.adopt(folder_ / "result");
+      std::ofstream(folder_ / "other") << "a second result";
+      const std::vector files{folder_ / "result", folder_ / "other"};
+      auto stored = store.adopt(files);
+      if (!stored) return tl::make_unexpected(stored.error());
+      return stored->front();
     }
     auto writer = store.write();
     if (!writer) return tl::make_unexpected(writer.error());

@@ -85,16 +85,22 @@ TEST_F(BlobTest, NamesThatAreNoHashFindNothing) {
   }
 }
 
+Result<StoredBlob> adopt(BlobStore& store, const std::filesystem::path& file) {
+  auto stored = store.adopt({&file, 1});
+  if (!stored) return tl::make_unexpected(stored.error());
+  return stored->front();
+}
+
 TEST_F(BlobTest, AnAdoptedFileMovesInAndLinksAreNotFollowed) {
   const auto store = BlobStore::open(folder_).value();
   std::ofstream(folder_ / "result") << "result bytes";
-  const StoredBlob blob = store->adopt(folder_ / "result").value();
+  const StoredBlob blob = adopt(*store, folder_ / "result").value();
   EXPECT_EQ(read(*store, blob.sha256), "result bytes");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "result"));
   std::filesystem::create_symlink("/etc/passwd", folder_ / "link");
-  EXPECT_EQ(store->adopt(folder_ / "link").error().code, "not_found");
-  EXPECT_EQ(store->adopt(folder_ / "tmp").error().code, "not_found");
-  EXPECT_EQ(store->adopt(folder_ / "missing").error().code, "not_found");
+  EXPECT_EQ(adopt(*store, folder_ / "link").error().code, "not_found");
+  EXPECT_EQ(adopt(*store, folder_ / "tmp").error().code, "not_found");
+  EXPECT_EQ(adopt(*store, folder_ / "missing").error().code, "not_found");
 }
 
 TEST_F(BlobTest, AnOpenBlobOutlivesItsRemoval) {
