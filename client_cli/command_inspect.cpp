@@ -1,4 +1,5 @@
 // kiln inspect FILE: what an artefact (or a plain scene) holds.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -147,7 +148,8 @@ std::string facts_text(const json& facts) {
     std::snprintf(text, sizeof text, "%.1f", facts["bytes_per_vertex"].get<double>());
     out += line("per vertex", text + std::string(" bytes"));
   }
-  for (const auto& [name, attribute] : facts.value("attributes", json::object()).items())
+  const json attributes = facts.value("attributes", json::object());
+  for (const auto& [name, attribute] : attributes.items())
     out += line("attribute", name + " " + attribute["type"].get<std::string>() + " x " + attribute["elements"].dump());
   for (const json& w : facts["warnings"])
     out += line("warning", w["where"].get<std::string>() + " " + w["message"].get<std::string>());

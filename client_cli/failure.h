@@ -2,7 +2,7 @@
 // Why a command could not do its work: a problem to show and the exit code that goes with it.
 
 #include <string>
-#include <tl/expected.hpp>
+#include <type_traits>
 #include <utility>
 
 #include "client_cli/exit_code.h"

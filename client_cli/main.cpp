@@ -1,10 +1,10 @@
 // kiln: the command-line client.
 #include <cstdio>
+#include <exception>
 #include <new>
 
 #include "client_cli/arguments.h"
 #include "client_cli/commands.h"
-#include "core/base/expects.h"
 
 namespace {
 
@@ -31,8 +31,8 @@ ExitCode run_command(const Options& options) {
     return ended({ExitCode::interrupted, {}});
   } catch (const std::bad_alloc&) {
     return ended(fail(ExitCode::error, "out_of_memory", "there is not enough memory").value());
-  } catch (const ContractViolation& violation) {
-    return ended(fail(ExitCode::error, "internal", std::string("a mistake of ours: ") + violation.what()).value());
+  } catch (const std::exception& mistake) {
+    return ended(fail(ExitCode::error, "internal", std::string("a mistake of ours: ") + mistake.what()).value());
   }
 }
 

@@ -22,7 +22,8 @@ struct JobInput {
 /// Uploads bytes under their hash unless the server knows them; the hash.
 Outcome<std::string> upload_asset(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& name);
 
-/// Uploads what is not known and posts the job to /v1/jobs. A .gltf with files beside it goes as one form.
+/// Uploads the scene if it is not known and posts the job to /v1/jobs. A .gltf with files beside it, or an environment
+/// file, goes as one form, so that the files keep their names.
 Outcome<JobReply> submit_job(ServerLink&, const JobInput&);
 /// The same to /v1/plan: the plan as JSON.
 Outcome<std::string> request_plan(ServerLink&, const JobInput&);

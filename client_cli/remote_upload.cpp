@@ -15,18 +15,12 @@ std::string_view view_of(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// A field value inside quotes, as browsers write it.
+/// A field value inside quotes (RFC 7578 by way of RFC 2183: a backslash escapes).
 std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
-    if (c == '"')
-      out += "%22";
-    else if (c == '\r')
-      out += "%0D";
-    else if (c == '\n')
-      out += "%0A";
-    else
-      out += c;
+    if (c == '"' || c == '\\') out += '\\';
+    if (c != '\r' && c != '\n') out += c;
   }
   return out + "\"";
 }
@@ -61,30 +55,35 @@ HttpHeaders headers_of(const JobInput& input) {
   return {{"Idempotency-Key", input.idempotency_key}};
 }
 
-/// The scene as an asset, the recipe as JSON.
-Outcome<HttpReply> post_with_asset(ServerLink& link, const std::string& path, const JobInput& input) {
-  KILN_TRY(hash, upload_asset(link, input.scene.main, input.scene.name));
+/// The job document; a scene of one file is uploaded apart, so that a known one is not sent again.
+Outcome<std::string> job_document(ServerLink& link, const JobInput& input) {
   json document = json::parse(input.recipe.document);
-  document["scene"] = {{"asset", hash}};
-  const std::string text = document.dump();
-  return link.post(path, headers_of(input), {"application/json", {text}});
+  if (input.scene.resources.empty()) {
+    KILN_TRY(hash, upload_asset(link, input.scene.main, input.scene.name));
+    document["scene"] = {{"asset", hash}};
+  }
+  return document.dump();
 }
 
-/// Everything in one form: a .gltf and the files that it names.
-Outcome<HttpReply> post_form(ServerLink& link, const std::string& path, const JobInput& input) {
+/// Files that keep their names: a .gltf and what it refers to, and the environment.
+Form job_form(const JobInput& input, const std::string& document) {
   Form form{"kiln-" + sha256_hex(input.scene.main), {}, {}};  // a boundary that no content holds by chance
-  form.add("job", "", "application/json", input.recipe.document);
+  form.add("job", "", "application/json", document);
+  const LoadedRecipe& recipe = input.recipe;
+  if (!recipe.environment.empty())
+    form.add("environment", recipe.environment_name, kBytes, view_of(recipe.environment));
+  if (input.scene.resources.empty()) return form;
   form.add("scene", input.scene.name, kBytes, view_of(input.scene.main));
   for (const auto& [uri, bytes] : input.scene.resources) form.add("resource", uri, kBytes, view_of(bytes));
-  return link.post(path, headers_of(input), form.body());
+  return form;
 }
 
 Outcome<HttpReply> post_job(ServerLink& link, const std::string& path, const JobInput& input) {
-  if (!input.recipe.environment.empty()) {
-    const auto sent = upload_asset(link, input.recipe.environment, input.recipe.environment_name);
-    if (!sent) return tl::make_unexpected(sent.error());
-  }
-  return input.scene.resources.empty() ? post_with_asset(link, path, input) : post_form(link, path, input);
+  KILN_TRY(document, job_document(link, input));
+  if (input.recipe.environment.empty() && input.scene.resources.empty())
+    return link.post(path, headers_of(input), {"application/json", {document}});
+  Form form = job_form(input, document);
+  return link.post(path, headers_of(input), form.body());
 }
 
 }  // namespace

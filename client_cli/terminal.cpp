@@ -3,10 +3,12 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 namespace kiln {
 namespace {
@@ -37,6 +39,14 @@ void show_field_error(const FieldError& error) {
   std::fputc('\n', stderr);
 }
 
+/// A problem document; in place of an HTTP status it has the exit code.
+std::string failure_json(const Failure& failure) {
+  auto document = nlohmann::json::parse(problem_json(failure.problem));
+  document.erase("status");
+  document["exit_code"] = static_cast<int>(failure.exit);
+  return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace
 
 Terminal detect_terminal(bool json) {
@@ -58,7 +68,7 @@ void warn(const Terminal& terminal, const std::string& sentence) {
 void show_failure(const Terminal& terminal, const Failure& failure) {
   const Problem& problem = failure.problem;
   if (terminal.json) {
-    std::fprintf(stderr, "%s\n", problem_json(problem).c_str());
+    std::fprintf(stderr, "%s\n", failure_json(failure).c_str());
     return;
   }
   const std::string place = problem.where.empty() ? "" : problem.where + ": ";
