@@ -17,7 +17,8 @@ struct Affine {
   }
 };
 
-/// The matrix of cofactors, which carries area vectors along: (M a) x (M b) = cofactors(M) (a x b), also when M is singular.
+/// The matrix of cofactors, which carries area vectors along: (M a) x (M b) = cofactors(M) (a x b), also when M is
+/// singular.
 inline Affine cofactors(const Affine& m) { return {cross(m.y, m.z), cross(m.z, m.x), cross(m.x, m.y), {}}; }
 
 inline bool is_finite(const Affine& m) { return is_finite(m.x) && is_finite(m.y) && is_finite(m.z) && is_finite(m.t); }

@@ -15,6 +15,19 @@ std::string counted(std::uint64_t n, const char* one, const char* many) {
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
+/// Before faces are judged: a vertex far out makes its faces look like needles.
+bool positions_in_range(const RawPart& part, Findings& findings) {
+  constexpr float kMaxCoordinate = 1e18F;
+  const auto far = [](const Vec3f& p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMaxCoordinate;
+  };
+  const auto bad = std::find_if(part.position.begin(), part.position.end(), far);
+  if (bad == part.position.end()) return true;
+  findings.fail("position_out_of_range", "A position is further than 1e18 from the origin.",
+                part.place + "/attributes/POSITION element " + std::to_string(bad - part.position.begin()));
+  return false;
+}
+
 struct TriangleHash {
   std::size_t operator()(const Triangle& t) const { return mix64(mix64(mix64(t[0]) ^ t[1]) ^ t[2]); }
 };
@@ -207,6 +220,7 @@ bool is_degenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
 }
 
 void clean_part(RawPart& part, MissingNormals missing, Findings& findings) {
+  if (!positions_in_range(part, findings)) return;
   drop_useless_triangles(part, findings);
   drop_isolated_vertices(part);
   if (!part.normal.empty()) {

@@ -29,7 +29,9 @@ class Findings {
   static constexpr std::size_t kMaxWarnings = 100;
 
  private:
-  std::string where(const std::string& place) const { return place.empty() ? file_ : file_ + ": " + place; }
+  std::string where(const std::string& place) const {
+    return place.empty() ? file_ : file_.empty() ? place : file_ + ": " + place;
+  }
 
   std::string file_;
   std::optional<Fault> fault_;

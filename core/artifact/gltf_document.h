@@ -60,7 +60,7 @@ struct Accessor {
 };
 
 struct DracoData {
-  int view = -1;  // -1: not compressed
+  int view = -1;                          // -1: not compressed
   std::map<std::string, int> attributes;  // name -> unique id
 };
 

@@ -12,8 +12,8 @@ struct Placement {
 };
 
 struct PlacedLight {
-  Light light;         // intensity and range in world units
-  Vec3d position;      // world
+  Light light;     // intensity and range in world units
+  Vec3d position;  // world
 };
 
 struct Placements {

@@ -20,7 +20,7 @@ inline constexpr std::uint64_t kMaxImageSide = 16384;
 std::optional<ImageHeader> read_image_header(std::span<const std::uint8_t> file);
 
 /// RGBA rows, top first, 8 bits, not linearised. Nothing if the data is corrupt or does not keep to its header.
-/// Memory: twice the decoded size; a PNG that inflates to more than its header says is refused.
+/// Memory: the decoded size, twice it for progressive JPEG; only the decoded rows are held.
 std::optional<std::vector<std::uint8_t>> decode_image(std::span<const std::uint8_t> file, const ImageHeader&);
 
 }  // namespace kiln

@@ -26,7 +26,7 @@ struct SceneFiles {
 struct ImportLimits {
   std::uint64_t max_json_bytes = 16u << 20;
   int max_json_depth = 64;
-  std::uint64_t max_objects = 1'000'000;      // of each glTF array
+  std::uint64_t max_objects = 1'000'000;  // of each glTF array
   std::uint64_t max_image_pixels = 64u << 20;
   std::uint64_t max_total_pixels = 256u << 20;
   std::uint64_t max_triangles = 200'000'000;  // after instancing

@@ -11,8 +11,8 @@ namespace kiln {
 struct JsonLimits {
   std::uint64_t max_bytes = 16u << 20;
   int max_depth = 64;
-  std::uint64_t max_objects = 1'000'000;              // elements of one member of the root
-  std::uint64_t max_tree_bytes = 128u << 20;          // estimate of the parsed tree
+  std::uint64_t max_objects = 1'000'000;      // elements of one member of the root
+  std::uint64_t max_tree_bytes = 128u << 20;  // estimate of the parsed tree
 };
 
 /// Fails with json_too_large, json_too_deep, too_many_objects or json_invalid. One pass, constant memory.

@@ -28,6 +28,7 @@ enum class MissingNormals { flat, smooth };
 ///   zero normals are made smooth, others brought to length 1; winding is turned round if most normals contradict it,
 ///   else the normals behind their faces are mirrored to the front;
 ///   tangents without direction drop the whole attribute.
+/// Fails with position_out_of_range past 1e18.
 /// Cost O(n) expected.
 void clean_part(RawPart&, MissingNormals, Findings&);
 

@@ -24,7 +24,9 @@ Vec3f bilinear(const Environment& e, double x, double y) {
     const int n = static_cast<int>(i) % e.width;
     return static_cast<std::size_t>(n < 0 ? n + e.width : n);
   };
-  const auto clamp = [&](double j) { return static_cast<std::size_t>(std::clamp(static_cast<int>(j), 0, e.height - 1)); };
+  const auto clamp = [&](double j) {
+    return static_cast<std::size_t>(std::clamp(static_cast<int>(j), 0, e.height - 1));
+  };
   const auto at = [&](std::size_t i, std::size_t j) { return e.radiance[j * static_cast<std::size_t>(e.width) + i]; };
   const auto tx = static_cast<float>(x - fx), ty = static_cast<float>(y - fy);
   const Vec3f top = at(wrap(fx), clamp(fy)) * (1 - tx) + at(wrap(fx + 1), clamp(fy)) * tx;

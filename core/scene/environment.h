@@ -29,7 +29,7 @@ std::vector<Vec3f> project_environment(const Environment&, int order);
 
 /// Built-in skies. `constant_sky` is 1 x 1; the others are 256 x 128 maps from formulas.
 Environment constant_sky(const Vec3f& radiance);
-Environment overcast_sky();          // CIE overcast, zenith radiance 1; the ground reflects 0.2 of the horizon
-Environment clear_sky_with_sun();    // CIE clear sky, sun at 45 degrees elevation, 0.53 degrees wide
+Environment overcast_sky();        // CIE overcast, zenith radiance 1; the ground reflects 0.2 of the horizon
+Environment clear_sky_with_sun();  // CIE clear sky, sun at 45 degrees elevation, 0.53 degrees wide
 
 }  // namespace kiln

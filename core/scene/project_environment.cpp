@@ -43,7 +43,8 @@ std::vector<Waves> row_moments(const Environment& e, int order) {
   return rows;
 }
 
-/// Adds weight * integral over phi of row(phi) * Y(theta, phi): the Y by a discrete Fourier transform, exact for their degree.
+/// Adds weight * integral over phi of row(phi) * Y(theta, phi): the Y by a discrete Fourier transform, exact for their
+/// degree.
 void add_parallel(const Waves& row, double theta, double rotation, double weight, int order, std::vector<Vec3d>& sum) {
   const int samples = 2 * order - 1;
   std::array<double, kMaxShOrder * kMaxShOrder> y{};
@@ -55,7 +56,9 @@ void add_parallel(const Waves& row, double theta, double rotation, double weight
     evaluate_sh(order, w, y.data());
     Vec3d value = row[0];
     for (int m = 1; m < order; ++m) {
-      value += (row[static_cast<std::size_t>(2 * m - 1)] * std::cos(m * phi) + row[static_cast<std::size_t>(2 * m)] * std::sin(m * phi)) * 2.0;
+      value += (row[static_cast<std::size_t>(2 * m - 1)] * std::cos(m * phi) +
+                row[static_cast<std::size_t>(2 * m)] * std::sin(m * phi)) *
+               2.0;
     }
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += value * (weight * y[i] / samples);
   }

@@ -30,7 +30,7 @@ struct Image {
   std::string mime;                   // "image/png" or "image/jpeg" (others are carried, not decoded)
   std::vector<std::uint8_t> encoded;  // the file's own bytes
   int width = 0, height = 0;
-  std::vector<std::uint8_t> rgba;     // height * width * 4, top row first, not linearised
+  std::vector<std::uint8_t> rgba;  // height * width * 4, top row first, not linearised
 };
 
 struct Texture {
@@ -51,12 +51,12 @@ enum class AlphaMode { opaque, mask, blend };
 
 struct Material {
   std::string name;
-  Vec4f base_color{1, 1, 1, 1};      // linear factor
-  TextureRef base_color_texture;     // sRGB
+  Vec4f base_color{1, 1, 1, 1};   // linear factor
+  TextureRef base_color_texture;  // sRGB
   float metallic = 1, roughness = 1;
   TextureRef metallic_roughness_texture;
-  Vec3f emission;                    // linear, emissiveFactor x emissiveStrength, W m^-2 sr^-1
-  TextureRef emission_texture;       // sRGB
+  Vec3f emission;               // linear, emissiveFactor x emissiveStrength, W m^-2 sr^-1
+  TextureRef emission_texture;  // sRGB
   TextureRef normal_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5F;
@@ -78,16 +78,16 @@ enum class LightType { directional, point, spot };
 struct Light {
   LightType type = LightType::point;
   std::string name;
-  Vec3f intensity;                // RGB: W m^-2 for directional, else W sr^-1 / frame.scale^2
+  Vec3f intensity;  // RGB: W m^-2 for directional, else W sr^-1 / frame.scale^2
   Vec3f position;
-  Vec3f direction{0, 0, -1};      // the way the light travels, unit
-  float range = 0;                // 0: infinite
+  Vec3f direction{0, 0, -1};                      // the way the light travels, unit
+  float range = 0;                                // 0: infinite
   float inner_cone = 0, outer_cone = 0.7853982F;  // radians, spot only
 };
 
 /// What the input has and the bake does not honour, or had to mend.
 struct Warning {
-  std::string code;     // snake_case
+  std::string code;  // snake_case
   std::string message;
   std::string where;
 };

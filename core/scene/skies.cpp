@@ -13,9 +13,9 @@ constexpr int kSkyWidth = 256, kSkyHeight = 128;
 constexpr double kGroundReflectance = 0.2;
 
 constexpr double kSunElevation = kPi / 4;
-constexpr double kSunAzimuth = kPi / 4;                     // between +X and +Z
+constexpr double kSunAzimuth = kPi / 4;  // between +X and +Z
 constexpr double kSunRadius = 0.53 / 2 * kPi / 180;
-constexpr double kSunNormalIrradiance = 30;                 // about 4 times what the sky sends on a level plane
+constexpr double kSunNormalIrradiance = 30;  // about 4 times what the sky sends on a level plane
 constexpr Vec3f kSkyTint{0.80F, 0.99F, 1.69F}, kSunTint{1.10F, 0.99F, 0.81F};  // luminance 1 (Rec. 709 weights)
 
 Vec3d direction(double x, double y) {
@@ -56,7 +56,8 @@ void add_sun(Environment& e) {
   std::vector<double> cover(e.radiance.size());
   double flux = 0;  // of radiance 1, as the bilinear map carries it: a texel counts by its solid angle
   for (int j = 0; j < kSkyHeight; ++j) {
-    const double solid_angle = 2 * kPi / kSkyWidth * (std::cos(kPi * j / kSkyHeight) - std::cos(kPi * (j + 1) / kSkyHeight));
+    const double solid_angle =
+        2 * kPi / kSkyWidth * (std::cos(kPi * j / kSkyHeight) - std::cos(kPi * (j + 1) / kSkyHeight));
     for (int i = 0; i < kSkyWidth; ++i) {
       if (dot(direction(i + 0.5, j + 0.5), sun) < std::cos(0.05)) continue;
       int inside = 0;

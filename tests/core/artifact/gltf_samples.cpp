@@ -14,7 +14,25 @@ void append_chunk(Bytes& out, std::uint32_t type, Bytes data, std::uint8_t paddi
   out.insert(out.end(), data.begin(), data.end());
 }
 
+void append_big_endian(Bytes& out, std::uint32_t x) {
+  for (const int shift : {24, 16, 8, 0}) out.push_back(static_cast<std::uint8_t>(x >> shift));
+}
+
 }  // namespace
+
+/// CRC-32 of the type and data, as PNG has it.
+void append_png_chunk(Bytes& png, const std::string& type, const Bytes& data) {
+  append_big_endian(png, static_cast<std::uint32_t>(data.size()));
+  const std::size_t start = png.size();
+  png.insert(png.end(), type.begin(), type.end());
+  png.insert(png.end(), data.begin(), data.end());
+  std::uint32_t crc = 0xFFFFFFFF;
+  for (std::size_t i = start; i < png.size(); ++i) {
+    crc ^= png[i];
+    for (int k = 0; k < 8; ++k) crc = (crc & 1) != 0 ? crc >> 1 ^ 0xEDB88320 : crc >> 1;
+  }
+  append_big_endian(png, ~crc);
+}
 
 void append_bytes(Bytes& out, std::initializer_list<int> values) {
   for (const int x : values) out.push_back(static_cast<std::uint8_t>(x));
@@ -87,32 +105,34 @@ bool has_warning(const Scene& scene, const std::string& code) {
 }
 
 Bytes png_header_only(std::uint32_t width, std::uint32_t height) {
-  Bytes out{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
-  for (const std::uint32_t x : {width, height}) {
-    for (int i = 3; i >= 0; --i) out.push_back(static_cast<std::uint8_t>(x >> (8 * i)));
+  Bytes out{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
+  Bytes header;
+  append_big_endian(header, width);
+  append_big_endian(header, height);
+  append_bytes(header, {8, 6, 0, 0, 0});  // RGBA of 8 bits, not interlaced
+  append_png_chunk(out, "IHDR", header);
+  return out;
+}
+
+Bytes zlib_stored(const Bytes& data) {
+  const auto size = static_cast<int>(data.size());
+  Bytes out;
+  append_bytes(out, {0x78, 0x01, 0x01, size & 255, size >> 8, ~size & 255, ~size >> 8 & 255});
+  out.insert(out.end(), data.begin(), data.end());
+  std::uint32_t a = 1, b = 0;
+  for (const std::uint8_t x : data) {
+    a = (a + x) % 65521;
+    b = (b + a) % 65521;
   }
-  append_bytes(out, {8, 6, 0, 0, 0, 0, 0, 0, 0});  // RGBA, no interlace, no checksum
+  append_big_endian(out, b << 16 | a);
   return out;
 }
 
 Bytes tiny_png() {
   Bytes out = png_header_only(2, 2);
-  // zlib, one stored block: two rows of filter 0 and two RGBA pixels.
-  const Bytes rows{0, 255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 0, 255, 255, 255, 255, 255, 255};
-  Bytes data{'I', 'D', 'A', 'T', 0x78, 0x01, 0x01, 18, 0, 0xED, 0xFF};
-  data.insert(data.end(), rows.begin(), rows.end());
-  std::uint32_t a = 1, b = 0;
-  for (const std::uint8_t x : rows) {
-    a = (a + x) % 65521;
-    b = (b + a) % 65521;
-  }
-  for (const std::uint32_t x : {b >> 8, b, a >> 8, a}) data.push_back(static_cast<std::uint8_t>(x));
-  const auto length = static_cast<std::uint8_t>(data.size() - 4);
-  for (const std::uint8_t x : {std::uint8_t{0}, std::uint8_t{0}, std::uint8_t{0}, length}) out.push_back(x);
-  out.insert(out.end(), data.begin(), data.end());
-  for (const char c : {'\0', '\0', '\0', '\0', '\0', '\0', '\0', '\0', 'I', 'E', 'N', 'D', '\0', '\0', '\0', '\0'}) {
-    out.push_back(static_cast<std::uint8_t>(c));
-  }
+  append_png_chunk(out, "IDAT",
+                   zlib_stored({0, 255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 0, 255, 255, 255, 255, 255, 255}));
+  append_png_chunk(out, "IEND", {});
   return out;
 }
 

@@ -79,10 +79,14 @@ std::vector<std::uint32_t> cube_indices();
 /// Whether the scene carries a warning of this code.
 bool has_warning(const Scene&, const std::string& code);
 
-/// A PNG of this size whose header says so, with no more data than that; and a real one of 2 x 2 pixels:
-/// red, green / blue, white.
+/// The signature and IHDR of a PNG of this size, nothing more; and a real one of 2 x 2 pixels: red, green / blue,
+/// white.
 Bytes png_header_only(std::uint32_t width, std::uint32_t height);
 Bytes tiny_png();
+void append_png_chunk(Bytes& png, const std::string& type, const Bytes& data);
+
+/// At most 65535 bytes as a zlib stream of one stored block.
+Bytes zlib_stored(const Bytes& data);
 
 std::string base64(const Bytes&);
 
