@@ -4,7 +4,6 @@
 
 #include "core/prt/row_sum.h"
 #include "core/sphere/sh.h"
-#include "core/trace/surface.h"
 
 namespace kiln {
 namespace {
@@ -16,12 +15,12 @@ void prefetch_row(const std::int16_t* row, int stride) {
 
 }  // namespace
 
-Gatherer::Gatherer(const GatherSource& source) : source_(source) {
+Gatherer::Gatherer(const GatherSource& source)
+    : source_(source), paths_(source.tracer, source.lamps, source.albedo, source.order, !source.fixed.empty()) {
   const auto stride = static_cast<std::size_t>(source.rows.stride());
   plain_sum_.resize(stride);
   textured_sum_.resize(stride);
   weight_.resize(stride);
-  path_sum_.resize(static_cast<std::size_t>(3 * sh_count(source.order)));
   result_.resize(static_cast<std::size_t>(source.rows.width()));
 }
 
@@ -29,9 +28,10 @@ void Gatherer::gather(const TransferPoint& point) {
   const std::uint64_t key = point_key(point) + static_cast<std::uint64_t>(source_.pass);
   const LocalFrame frame = local_frame(source_.sets, point.normal, source_.seed, key);
   random_ = Random(source_.seed, key, 1);
-  for (auto* sum : {&textured_sum_, &path_sum_}) std::fill(sum->begin(), sum->end(), 0.0F);
+  std::fill(textured_sum_.begin(), textured_sum_.end(), 0.0F);
   std::fill(plain_sum_.begin(), plain_sum_.end(), 0);
   fixed_ = {};
+  paths_.clear();
 
   const Vec3f origin = ray_origin(point);
   for (Packet& p : packets_) {
@@ -66,15 +66,20 @@ void Gatherer::choose(Packet& packet) {
     const std::uint32_t t = packet.hits.triangle[i];
     packet.vertex[i] = kNoHit;
     if (t == kNoHit) continue;
-    const HitSide side = source_.faces.side(t, {packet.rays.dx[i], packet.rays.dy[i], packet.rays.dz[i]});
-    if (side == HitSide::flipped) add_flipped(packet, i);
+    const Vec3f direction{packet.rays.dx[i], packet.rays.dy[i], packet.rays.dz[i]};
+    const float u = packet.hits.u[i], v = packet.hits.v[i];
+    const HitSide side = source_.faces.side(t, direction);
+    if (side == HitSide::flipped) {
+      paths_.add({t, u, v, direction, {1, 1, 1}, source_.pass}, random_);
+    }
     if (side != HitSide::front) continue;
     const float pick = (static_cast<float>(bits & 0xffffU) + 0.5F) * 0x1p-16F;
-    const float u = packet.hits.u[i], v = packet.hits.v[i];
     const std::uint32_t vertex = triangles[t][pick < u ? 1 : pick < u + v ? 2 : 0];
     packet.vertex[i] = vertex;
     prefetch_row(source_.rows.row(vertex), source_.rows.stride());
     if (!source_.fixed.empty()) __builtin_prefetch(&source_.fixed[vertex]);
+    if (!source_.faces.is_plain(t))
+      packet.tap[i] = source_.albedo.tap(t, u, v, static_cast<std::uint32_t>(random_.next()));
   }
 }
 
@@ -95,8 +100,7 @@ void Gatherer::add(const Packet& packet) {
 }
 
 void Gatherer::add_textured(const Packet& packet, std::size_t lane) {
-  const SurfacePoint hit{.triangle = packet.hits.triangle[lane], .u = packet.hits.u[lane], .v = packet.hits.v[lane]};
-  const Vec3f albedo = albedo_at(source_.tracer.scene(), hit);
+  const Vec3f albedo = source_.albedo.read(packet.tap[lane]);
   const int count = sh_count(source_.order);
   for (int c = 0; c < source_.channels; ++c)
     std::fill_n(weight_.begin() + c * count, count, albedo[static_cast<std::size_t>(c)]);
@@ -105,23 +109,14 @@ void Gatherer::add_textured(const Packet& packet, std::size_t lane) {
   if (!source_.fixed.empty()) fixed_ += albedo * source_.fixed[vertex];
 }
 
-void Gatherer::add_flipped(const Packet& packet, std::size_t lane) {
-  const FlippedHit hit{.triangle = packet.hits.triangle[lane],
-                       .u = packet.hits.u[lane],
-                       .v = packet.hits.v[lane],
-                       .direction = {packet.rays.dx[lane], packet.rays.dy[lane], packet.rays.dz[lane]},
-                       .reflections = source_.pass};
-  const PathSum sum{source_.order, path_sum_.data(), source_.fixed.empty() ? nullptr : &fixed_};
-  rays_ += static_cast<std::uint64_t>(add_flipped_path(source_.tracer, source_.lamps, hit, random_, sum));
-}
-
 void Gatherer::finish() {
+  paths_.finish(random_);
   const float weight = 1.0F / static_cast<float>(source_.sets.samples());
   for (std::size_t i = 0; i < result_.size(); ++i) {
     const float rows = source_.rows.unit(static_cast<int>(i)) * (static_cast<float>(plain_sum_[i]) + textured_sum_[i]);
-    result_[i] = weight * (rows + path_sum_[i]);
+    result_[i] = weight * (rows + paths_.rows()[i]);
   }
-  fixed_ *= weight;
+  fixed_ = (fixed_ + paths_.fixed()) * weight;
 }
 
 }  // namespace kiln

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/prt/direction_sets.h"
-#include "core/prt/flipped_path.h"
+#include "core/prt/flipped_paths.h"
 #include "core/prt/gather_faces.h"
 #include "core/prt/packed_rows.h"
 #include "core/prt/ray_origin.h"
@@ -23,6 +23,7 @@ struct GatherSource {
   const Tracer& tracer;
   const Lamps& lamps;
   const GatherFaces& faces;
+  const HitAlbedo& albedo;
   const DirectionSets& sets;
   const PackedRows& rows;
   const std::vector<Vec3f>& fixed;
@@ -41,26 +42,27 @@ class Gatherer {
   void gather(const TransferPoint&);
   std::span<const float> result() const { return result_; }
   const Vec3f& fixed() const { return fixed_; }
-  std::uint64_t rays() const { return rays_; }
+  std::uint64_t rays() const { return rays_ + paths_.rays(); }
 
  private:
   struct Packet {
     Rays16 rays;
     Hits16 hits;
     std::array<std::uint32_t, kPacket> vertex;  // the corner drawn, or kNoHit
+    std::array<HitAlbedo::Tap, kPacket> tap;    // where the part is not plain
   };
   void trace(Packet&, const LocalFrame&, int packet);
   void choose(Packet&);
   void add(const Packet&);
   void add_textured(const Packet&, std::size_t lane);
-  void add_flipped(const Packet&, std::size_t lane);
   void finish();
 
   const GatherSource& source_;
   std::array<Packet, 3> packets_;
   Random random_{0, 0};
   std::vector<std::int32_t> plain_sum_;
-  std::vector<float> textured_sum_, weight_, path_sum_, result_;
+  std::vector<float> textured_sum_, weight_, result_;
+  FlippedPaths paths_;
   Vec3f fixed_;
   std::uint64_t rays_ = 0;
 };

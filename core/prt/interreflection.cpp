@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <optional>
+#include <cstddef>
 
 #include "core/base/expects.h"
 #include "core/prt/gather.h"
@@ -26,6 +26,11 @@ struct Layer {
   std::vector<Vec3f> fixed;
 };
 
+// The final coefficients of a vertex leave room for two packed rows: T_k and T_{k+1} live where the result will be.
+std::size_t pitch_of(const Transfer& t) {
+  return std::max(t.stride() * sizeof(float), 2 * PackedRows::row_bytes(t.order, t.channels));
+}
+
 class Solver {
  public:
   Solver(const Tracer& tracer, std::vector<float> direct, std::vector<Vec3f> fixed, const Interreflection& params)
@@ -33,34 +38,43 @@ class Solver {
         mesh_(tracer.scene().mesh),
         params_(params),
         faces_(tracer.scene()),
+        albedo_(tracer.scene()),
         lamps_(tracer),
-        channels_((faces_.grey() || params.bounces == 0) && is_grey(fixed) ? 1 : 3),
         face_of_(widest_faces(mesh_)),
-        direct_(mesh_.position.size(), params.order, 1),
+        direct_storage_(mesh_.position.size() * PackedRows::row_bytes(params.order, 1)),
+        direct_(params.order, 1, direct_storage_.data(), PackedRows::row_bytes(params.order, 1)),
         fixed_direct_(std::move(fixed)) {
-    const auto count = static_cast<std::size_t>(sh_count(params.order));
-    for (std::size_t v = 0; v < mesh_.position.size(); ++v) direct_.store(v, direct.data() + v * count);
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v) direct_.store(v, direct.data() + v * count());
+    const bool grey = (faces_.grey() || params.bounces == 0) && is_grey(fixed_direct_);
+    out_ = {.order = params.order, .channels = grey ? 1 : 3, .fixed = !fixed_direct_.empty(), .coefficients = {}};
+    pitch_ = pitch_of(out_);
   }
 
   Transfer solve(Threads& threads, TransferStats* stats) {
-    Layer light = layer();  // T_0 = D
-    for (std::size_t v = 0; v < mesh_.position.size(); ++v)
+    out_.coefficients.resize(mesh_.position.size() * (pitch_ / sizeof(float)));
+    Layer light = layer(0);  // T_0 = D
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
       store(light, v, direct_row(v), fixed_at(v), params_.bounces > 0);
+    }
     if (params_.bounces > 0) iterate(light, threads, stats);
-    direct_.release_before(~std::size_t{0});
-    return unpack(light);
+    unpack(light);
+    return std::move(out_);
   }
 
  private:
   using Row = std::array<float, 3 * sh_count(kMaxShOrder)>;
   std::size_t count() const { return static_cast<std::size_t>(sh_count(params_.order)); }
 
-  Layer layer() const { return {PackedRows(mesh_.position.size(), params_.order, channels_), fixed_direct_}; }
+  Layer layer(std::size_t half) {
+    auto* first = reinterpret_cast<std::byte*>(out_.coefficients.data());
+    const std::size_t offset = half * PackedRows::row_bytes(out_.order, out_.channels);
+    return {PackedRows(out_.order, out_.channels, first + offset, pitch_), fixed_direct_};
+  }
 
   Row direct_row(std::size_t v) const {
     Row row;
     direct_.load(v, row.data());
-    for (int c = 1; c < channels_; ++c)
+    for (int c = 1; c < out_.channels; ++c)
       std::copy_n(row.data(), count(), row.data() + static_cast<std::size_t>(c) * count());
     return row;
   }
@@ -70,7 +84,7 @@ class Solver {
   void store(Layer& to, std::size_t v, Row row, Vec3f fixed, bool exit) const {
     if (exit && face_of_[v] != kNoFace && faces_.is_plain(face_of_[v])) {
       const Vec3f albedo = faces_.plain(mesh_.part[face_of_[v]]);
-      for (int c = 0; c < channels_; ++c) {
+      for (int c = 0; c < out_.channels; ++c) {
         for (std::size_t i = 0; i < count(); ++i)
           row[static_cast<std::size_t>(c) * count() + i] *= albedo[static_cast<std::size_t>(c)];
       }
@@ -85,10 +99,10 @@ class Solver {
     const DirectionSets sets(0, params_.samples, kSets, mix64(params_.seed));
     const SupportTree support(mesh_.position);
     const std::vector<std::uint32_t> order = morton_order(mesh_.position);
-    Layer next = layer();
+    Layer next = layer(1);
     for (int pass = 0; pass < params_.bounces; ++pass) {
-      const GatherSource source{tracer_,     lamps_,        faces_,    sets, light.rows,
-                                light.fixed, params_.order, channels_, pass, params_.seed};
+      const GatherSource source{tracer_,     lamps_,        faces_,        albedo_, sets,        light.rows,
+                                light.fixed, params_.order, out_.channels, pass,    params_.seed};
       std::atomic<std::uint64_t> rays = 0;
       threads.for_blocks(order.size(), kBlock, [&](std::size_t begin, std::size_t end) {
         Gatherer gatherer(source);
@@ -113,32 +127,32 @@ class Solver {
     store(next, v, row, fixed, pass + 1 < params_.bounces);
   }
 
-  // Frees packed rows as it goes, so that packed and unpacked light are never held whole together.
-  Transfer unpack(Layer& light) const {
-    Transfer out{.order = params_.order, .channels = channels_, .fixed = !fixed_direct_.empty(), .coefficients = {}};
-    out.coefficients.reserve(mesh_.position.size() * out.stride());
+  // Packed rows become coefficients in place: a vertex's place ends before the rows of the next.
+  void unpack(const Layer& light) {
+    float* to = out_.coefficients.data();
     Row row;
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
       light.rows.load(v, row.data());
-      light.rows.release_before(v);
-      for (int c = 0; c < channels_; ++c) {
-        const float* channel = row.data() + static_cast<std::size_t>(c) * count();
-        out.coefficients.insert(out.coefficients.end(), channel, channel + count());
-        if (out.fixed) out.coefficients.push_back(light.fixed[v][static_cast<std::size_t>(c)]);
+      for (int c = 0; c < out_.channels; ++c) {
+        to = std::copy_n(row.data() + static_cast<std::size_t>(c) * count(), count(), to);
+        if (out_.fixed) *to++ = light.fixed[v][static_cast<std::size_t>(c)];
       }
     }
-    return out;
+    out_.coefficients.resize(mesh_.position.size() * out_.stride());
   }
 
   const Tracer& tracer_;
   const Mesh& mesh_;
   const Interreflection& params_;
   GatherFaces faces_;
+  HitAlbedo albedo_;
   Lamps lamps_;
-  int channels_;
   std::vector<std::uint32_t> face_of_;
+  std::vector<std::byte> direct_storage_;
   PackedRows direct_;
   std::vector<Vec3f> fixed_direct_;
+  Transfer out_;
+  std::size_t pitch_ = 0;
 };
 
 }  // namespace

@@ -6,39 +6,34 @@
 // for noise; beyond it numbers are clamped.
 // Error   rounding, at most 0.625 sqrt((2l + 1) / 4 pi) / 32767: 5e-6 in band 0, 2e-5 in band 5
 // Shape   a row has channels x order^2 numbers, channel by channel, zero padded to a multiple of 8
-// Memory  blocks of 4096 rows, each freed alone
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 namespace kiln {
 
+/// Rows laid into memory that the caller owns, `pitch` bytes apart.
 class PackedRows {
  public:
-  PackedRows(std::size_t rows, int order, int channels);
+  PackedRows(int order, int channels, void* first, std::size_t pitch);
+  /// Bytes that one row takes.
+  static std::size_t row_bytes(int order, int channels);
 
-  int width() const { return width_; }    // numbers of a row
-  int stride() const { return stride_; }  // with the padding
+  int width() const { return static_cast<int>(unit_.size()); }  // numbers of a row
+  int stride() const { return stride_; }                        // with the padding
   /// What one unit of number i is worth.
   float unit(int i) const { return unit_[static_cast<std::size_t>(i)]; }
 
-  const std::int16_t* row(std::size_t r) const {
-    return blocks_[r >> kBlockBits].get() + (r & kBlockMask) * static_cast<std::size_t>(stride_);
-  }
+  const std::int16_t* row(std::size_t r) const { return reinterpret_cast<const std::int16_t*>(first_ + r * pitch_); }
   void store(std::size_t r, const float* values);
   void load(std::size_t r, float* values) const;
 
-  /// Frees all rows of whole blocks before row r.
-  void release_before(std::size_t r);
-
  private:
-  static constexpr std::size_t kBlockBits = 12, kBlockMask = (1U << kBlockBits) - 1;
-  int width_, stride_;
-  std::size_t released_ = 0;
-  std::vector<float> unit_;
-  std::vector<std::unique_ptr<std::int16_t[]>> blocks_;
+  std::byte* first_;
+  std::size_t pitch_;
+  int stride_;
+  std::vector<float> unit_, per_unit_;
 };
 
 }  // namespace kiln

@@ -3,6 +3,7 @@
 //   kiln_transfer_rates [points] [rounds]
 
 #include <embree3/rtcore.h>
+#include <malloc.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -167,22 +168,27 @@ void bench_bounce(const std::string& name, const Scene& scene, const Points& poi
   const Lamps lamps(tracer);
   const GatherFaces faces(scene);
   const DirectionSets sets(0, kSamples, 8, 1);
-  PackedRows rows(scene.mesh.position.size(), 6, 3);
+  const std::size_t row_bytes = PackedRows::row_bytes(6, 3);
+  std::vector<std::byte> memory(scene.mesh.position.size() * 2 * row_bytes);  // two rows side by side, as in a bake
+  PackedRows rows(6, 3, memory.data(), 2 * row_bytes);
+  const HitAlbedo albedo(scene);
   const std::vector<float> row(108, 0.1F);
   for (std::size_t v = 0; v < scene.mesh.position.size(); ++v) rows.store(v, row.data());
   const std::vector<Vec3f> fixed;
-  const GatherSource source{tracer, lamps, faces, sets, rows, fixed, 6, 3, 0, 1};
+  const GatherSource source{tracer, lamps, faces, albedo, sets, rows, fixed, 6, 3, 0, 1};
   const BareEmbree bare(scene);
   Rates rates;
   for (int round = 0; round < rounds; ++round) {
     const double wall = wall_seconds(), start = process_seconds();
+    std::atomic<std::uint64_t> rays = 0;  // those of flipped paths among them
     threads.for_blocks(points.point.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       Gatherer gatherer(source);
       for (std::size_t i = begin; i < end; ++i) gatherer.gather(points.point[i]);
+      rays += gatherer.rays();
     });
-    const double seconds = process_seconds() - start, count = static_cast<double>(points.point.size() * kSamples);
-    rates.ours.push_back(count / seconds);
-    rates.wall.push_back(count / (wall_seconds() - wall));
+    const double seconds = process_seconds() - start;
+    rates.ours.push_back(static_cast<double>(rays) / seconds);
+    rates.wall.push_back(static_cast<double>(rays) / (wall_seconds() - wall));
 
     std::atomic<double> bare_seconds = 0;
     threads.for_blocks(points.point.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -199,7 +205,7 @@ void bench_bounce(const std::string& name, const Scene& scene, const Points& poi
       }
       bare_seconds += sum;
     });
-    rates.bare.push_back(count / bare_seconds);
+    rates.bare.push_back(static_cast<double>(points.point.size() * kSamples) / bare_seconds);
   }
   print("bounce", name, scene, threads.count(), rates, ",\"order\":6,\"channels\":3,\"samples\":256");
 }
@@ -208,6 +214,7 @@ void bench_bounce(const std::string& name, const Scene& scene, const Points& poi
 void bench_memory(const std::string& name, const Scene& scene, Threads& threads) {
   const Tracer tracer(scene, threads);
   const auto vertices = static_cast<double>(scene.mesh.position.size());
+  malloc_trim(0);  // what earlier cases freed is not to be reused unseen
   forget_peak();
   const double before = memory_bytes("VmRSS");
   std::vector<float> direct = bake_direct_transfer(tracer, vertex_points(scene.mesh), {.samples = 16}, threads);
