@@ -11,6 +11,7 @@
 #include "server/http/http_server.h"
 #include "server/kilnd/options.h"
 #include "server/work/bake_worker.h"
+#include "server/work/sandbox.h"
 #include "server/work/service.h"
 #include "server/work/worker_protocol.h"
 
@@ -66,7 +67,17 @@ std::string url(const std::string& address, int port) {
   return "http://" + (v6 ? "[" + address + "]" : address) + ":" + std::to_string(port);
 }
 
+/// True when the workers will be as locked in as the options demand.
+bool check_sandbox(bool required) {
+  const Sandbox sandbox = sandbox_support();
+  if (sandbox.whole()) return true;
+  std::fprintf(stderr, "kilnd: this kernel does not lock workers in:%s%s\n", sandbox.files ? "" : " no Landlock",
+               sandbox.calls ? "" : " no seccomp");
+  return !required;
+}
+
 int serve(const DaemonOptions& options) {
+  if (!check_sandbox(options.service.require_sandbox)) return kExitConfig;
   const sigset_t ends = end_signals();
   ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the first thread
   ::signal(SIGPIPE, SIG_IGN);

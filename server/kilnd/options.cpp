@@ -48,6 +48,9 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   add(app, "--first-retry-s", raw.first_retry_s, "pause after trouble of the machine, four times longer each time")
       ->check(CLI::NonNegativeNumber);
   add(app, "--worker-command", raw.worker_command, "another program as worker, for tests")->group("");
+  app.add_flag("--require-sandbox", options.service.require_sandbox,
+               "refuse to start where workers cannot be locked in")
+      ->envname("KILN_REQUIRE_SANDBOX");
   app.add_flag("--quiet", options.quiet, "no log line per request")->envname("KILN_QUIET");
   app.set_version_flag("--version", std::string("kilnd ") + kEngineVersion);
 }

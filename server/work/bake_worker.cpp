@@ -15,6 +15,7 @@
 
 #include "core/bake/bake.h"
 #include "core/base/threads.h"
+#include "server/work/sandbox.h"
 #include "server/work/worker_protocol.h"
 
 namespace kiln {
@@ -157,9 +158,12 @@ void tie_to_parent(int parent) {
   if (::getppid() != parent) std::_Exit(kExitCanceled);
 }
 
-int run_order() {
+int run_order(const Sandbox& sandbox) {
   const WorkerOrder order = read_order();
   tie_to_parent(order.parent);
+  if (order.require_sandbox && !sandbox.whole()) {
+    throw WorkerTrouble{{"internal", "this machine gives workers no sandbox, and the server demands one", ""}};
+  }
   Threads threads(order.threads);
   const TermWatch watch(threads);
   const BakeInput input = read_input(order);
@@ -178,9 +182,8 @@ int failed(const Fault& fault) try {
 int bake_worker_main(int argc, char** argv) try {
   ::pthread_sigmask(SIG_BLOCK, &TermWatch::set(), nullptr);
   ::signal(SIGPIPE, SIG_IGN);
-  ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   if (argc != 2 || ::chdir(argv[1]) != 0) return kExitInternal;
-  return run_order();
+  return run_order(enter_sandbox(argv[1]));
 } catch (const Cancelled&) {
   return kExitCanceled;
 } catch (const WorkerTrouble& trouble) {

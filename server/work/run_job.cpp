@@ -35,11 +35,13 @@ Result<Limits> limits_of(const std::string& recipe) {
   return parsed->limits;
 }
 
-WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const Limits& limits, int threads) {
+WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const Limits& limits,
+                     const WorkOptions& options) {
   WorkerOrder order;
   order.inputs = inputs;
   order.recipe = recipe;
-  order.threads = limits.threads > 0 ? limits.threads : threads;
+  order.threads = limits.threads > 0 ? limits.threads : options.threads;
+  order.require_sandbox = options.require_sandbox;
   order.parent = static_cast<int>(::getpid());
   return order;
 }
@@ -115,8 +117,8 @@ class JobRun {
     const auto limits = limits_of(claim_.job.recipe);
     if (!limits) return fail({limits.error(), 500});
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
-    const auto folder = WorkFolder::make(
-        path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options.threads));
+    const auto folder =
+        WorkFolder::make(path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options));
     if (!folder) return after_trouble(folder.error());
     end_as(bake(*folder, *limits), *folder);
   }
@@ -246,7 +248,7 @@ void run_job(const Claim& claim, StopSignal& stop, const WorkPlace& place) { Job
 Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe, const StopSignal& stop,
                              const WorkPlace& place) {
   KILN_TRY(limits, limits_of(recipe));
-  WorkerOrder order = order_of(inputs, recipe, limits, place.options.threads);
+  WorkerOrder order = order_of(inputs, recipe, limits, place.options);
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
   const std::uint64_t memory = limits.memory_mb << 20;

@@ -27,6 +27,7 @@ struct WorkOptions {
   std::vector<std::string> worker_command;  // see WorkerStart
   int threads = 1;                          // when the recipe does not say
   Millis first_retry{10'000};
+  bool require_sandbox = false;
 };
 
 /// What all of the work shares. `blob_gate`: held shared from making a blob until a row refers to it, and alone while

@@ -145,7 +145,7 @@ class LocalUpload final : public AssetUpload {
 WorkOptions LocalService::work_options() const {
   const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
-  return {options_.data / "work", options_.worker_command, threads, options_.first_retry};
+  return {options_.data / "work", options_.worker_command, threads, options_.first_retry, options_.require_sandbox};
 }
 
 void LocalService::drain() {

@@ -32,7 +32,8 @@ struct ServiceOptions {
   double soft_free_fraction = 0.10;  // below: uploads are refused with disk_full
   double hard_free_fraction = 0.05;  // below: nothing is claimed, the queue waits
   Millis blob_grace{24 * 3600 * 1000};
-  Millis first_retry{10'000};  // after trouble of the machine: x 4 each time, at most 1 h, 5 times
+  Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
+  bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
 };
 
 /// A job or plan to be. All files are blobs already (put_asset).

@@ -79,7 +79,8 @@ std::string order_json(const WorkerOrder& order) {
                {"recipe", order.recipe},
                {"mode", order.mode == WorkerMode::plan ? "plan" : "bake"},
                {"threads", order.threads},
-               {"parent", order.parent}});
+               {"parent", order.parent},
+               {"require_sandbox", order.require_sandbox}});
 }
 
 Result<WorkerOrder> parse_order(std::string_view text) try {
@@ -92,6 +93,7 @@ Result<WorkerOrder> parse_order(std::string_view text) try {
   order.mode = value.at("mode") == "plan" ? WorkerMode::plan : WorkerMode::bake;
   order.threads = value.at("threads").get<int>();
   order.parent = value.at("parent").get<int>();
+  order.require_sandbox = value.at("require_sandbox").get<bool>();
   return order;
 } catch (const json::exception&) {
   return fault("internal", "the worker did not understand its order");

@@ -28,7 +28,8 @@ struct WorkerOrder {
   std::string recipe;  // canonical JSON
   WorkerMode mode = WorkerMode::bake;
   int threads = 0;
-  int parent = 0;  // process id of the supervisor: a worker ends when it is gone
+  int parent = 0;                // process id of the supervisor: a worker ends when it is gone
+  bool require_sandbox = false;  // refuse to work where the kernel has not all of server/work/sandbox.h
 };
 
 /// Path of an input within the folder, by its place: 0 the scene, 1.. the resources, then the environment.

@@ -42,6 +42,7 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   order.mode = WorkerMode::plan;
   order.threads = 3;
   order.parent = 17;
+  order.require_sandbox = true;
   const WorkerOrder back = parse_order(order_json(order)).value();
   EXPECT_EQ(back.inputs.scene, order.inputs.scene);
   EXPECT_EQ(back.inputs.resources, order.inputs.resources);
@@ -50,6 +51,7 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   EXPECT_EQ(back.mode, WorkerMode::plan);
   EXPECT_EQ(back.threads, 3);
   EXPECT_EQ(back.parent, 17);
+  EXPECT_TRUE(back.require_sandbox);
 }
 
 TEST(WorkerProtocol, ResultNamesCannotLeaveTheirFolder) {

@@ -1,0 +1,84 @@
+// The program itself: what it refuses to be started with, and how it ends.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "tests/faults/daemon.h"
+
+namespace kiln::testing {
+namespace {
+
+class KilndTest : public ::testing::Test {
+ protected:
+  KilndTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "kiln_program.XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~KilndTest() override { std::filesystem::remove_all(folder_); }
+
+  std::unique_ptr<Daemon> start(const std::vector<std::string>& arguments) const {
+    return std::make_unique<Daemon>(KILN_DAEMON, folder_ / "data", arguments);
+  }
+  struct End {
+    int code = 0;
+    std::string text;
+  };
+  /// Runs a kilnd that should end by itself.
+  End refuse(const std::string& arguments) const {
+    const std::string out = folder_ / "out.txt";
+    const std::string command = std::string("timeout 20 ") + KILN_DAEMON + " --data " + (folder_ / "data").string() +
+                                " --port 0 " + arguments + " >" + out + " 2>&1";
+    const int status = std::system(command.c_str());
+    std::ifstream in(out);
+    std::stringstream text;
+    text << in.rdbuf();
+    return {WEXITSTATUS(status), text.str()};
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(KilndTest, OpenToOthersWithoutTokensIsRefusedInOneLine) {
+  const End end = refuse("--bind 0.0.0.0");
+  EXPECT_EQ(end.code, 78);
+  EXPECT_EQ(std::ranges::count(end.text, '\n'), 1) << end.text;
+  EXPECT_NE(end.text.find("--token-file"), std::string::npos);
+}
+
+TEST_F(KilndTest, ATokenFileThatHoldsNoTokenIsRefused) {
+  std::ofstream(folder_ / "tokens") << "short\n";
+  EXPECT_EQ(refuse("--token-file " + (folder_ / "tokens").string()).code, 78);
+  EXPECT_EQ(refuse("--token-file " + (folder_ / "missing").string()).code, 78);
+}
+
+TEST_F(KilndTest, WithATokenFileNobodyElseIsServed) {
+  std::ofstream(folder_ / "tokens") << std::string(43, 'a') << "\n";
+  const auto daemon = start({"--token-file", folder_ / "tokens"});
+  EXPECT_EQ(http_get(daemon->port(), "/v1/jobs").status, 401);
+  EXPECT_EQ(http_get(daemon->port(), "/healthz").status, 200);
+}
+
+TEST_F(KilndTest, ASecondServerOnTheSameDataIsRefused) {
+  const auto daemon = start({});
+  const End end = refuse("");
+  EXPECT_EQ(end.code, 78);
+  EXPECT_NE(end.text.find("another server"), std::string::npos) << end.text;
+}
+
+TEST_F(KilndTest, AnUnknownFlagIsAUsageError) { EXPECT_EQ(refuse("--no-such-flag").code, 2); }
+
+TEST_F(KilndTest, TermEndsAnIdleServerWithZero) {
+  const auto daemon = start({});
+  EXPECT_EQ(http_get(daemon->port(), "/readyz").status, 200);
+  const int status = daemon->terminate();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+}  // namespace
+}  // namespace kiln::testing
