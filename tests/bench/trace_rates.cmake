@@ -1,0 +1,10 @@
+# Our ray queries against Embree's own.
+if(TARGET kiln_import AND TARGET kiln_trace)
+  add_executable(kiln_trace_rates trace_rates.cpp)
+  kiln_flags(kiln_trace_rates)
+  target_link_libraries(kiln_trace_rates PRIVATE kiln_trace kiln_import embree)
+  target_compile_definitions(kiln_trace_rates PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
+endif()
+add_executable(kiln_sphere_rates sphere_rates.cpp)
+kiln_flags(kiln_sphere_rates)
+target_link_libraries(kiln_sphere_rates PRIVATE kiln_sphere)
