@@ -128,15 +128,13 @@ TEST(Hardening, H7UploadsHaveTheirOwnCap) {
   HttpOptions options = few_threads();
   options.max_uploads = 2;
   const RunningServer server(options);
-  const std::string open_upload = "POST /v1/assets HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\nabc";
+  const std::string open_upload = request_text("POST", "/v1/assets", {"Expect: 100-continue", "Content-Length: 100"});
   RawConnection first(server.port()), second(server.port());
-  first.send(open_upload);
-  second.send(open_upload);
-  RawReply third;
-  for (int tries = 0; tries < 100 && third.status != 503; ++tries) {  // until both hold their place
-    third = server.raw(request_text("POST", "/v1/assets", {}, "abc"));
-    std::this_thread::sleep_for(10ms);
+  for (RawConnection* upload : {&first, &second}) {
+    upload->send(open_upload);
+    upload->read_until("100 Continue");  // now it holds its place
   }
+  const RawReply third = server.raw(request_text("POST", "/v1/assets", {}, "abc"));
   expect_refusal(third, 503, "overloaded");
   EXPECT_EQ(third.fields.count("retry-after"), 1U);
   expect_alive(server);
