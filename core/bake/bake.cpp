@@ -7,6 +7,7 @@
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/evaluate.h"
 #include "core/artifact/look.h"
+#include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
 #include "core/bake/job_light.h"
@@ -92,14 +93,16 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   threads.check();
 
   log.begin("plan", 0.06);
-  Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads.count());
+  Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
 
   Transfer transfer = solve_transport(scene, plan, input.recipe.seed, log, threads);
 
   log.begin("write", 0.9);
   BakedScene baked = assemble(std::move(scene), std::move(transfer), light, provenance(input));
-  KILN_TRY(glb, write_baked_glb(baked, {.coefficient_bits = plan.coefficient_bits}));
+  const Encoding encoding{.coefficient_bits = plan.coefficient_bits};
+  KILN_TRY(glb, write_baked_glb(baked, encoding));
+  KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   baked.transfer = {};  // from here on the delivered file is what counts
   KILN_TRY(decoded, reopen(glb, baked.scene));
   threads.check();
@@ -108,7 +111,9 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   if (input.recipe.certificate) {
     log.begin("certificate", 0.97);
     const Tracer truth(baked.scene, threads);
-    certificate = certify(decoded, truth, light, {.seed = input.recipe.seed}, threads);
+    CertificateOptions options{.seed = input.recipe.seed};
+    options.samples = certificate_samples(log.rays(), options.points);
+    certificate = certify(decoded, truth, light, options, threads);
   }
 
   log.begin("preview", 1.0);
@@ -124,7 +129,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .log = log,
                                           .result = decoded.scene.mesh,
                                           .result_bytes = glb.size(),
-                                          .streams = {},
+                                          .streams = streams,
                                           .certificate = certificate});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(glb)});
@@ -137,7 +142,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
 Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   KILN_TRY(scene, read_scene(input));
   if (auto light = job_light(input); !light) return tl::make_unexpected(light.error());
-  const Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads.count());
+  const Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   return plan_report_json(plan, scene);
 }

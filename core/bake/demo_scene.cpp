@@ -77,7 +77,7 @@ void add_knot(Piece& piece, const Vec3f& center, std::array<int, 2> segments) {
   for (int i = 0; i < along; ++i) {
     for (int j = 0; j < around; ++j) {
       const std::uint32_t a = vertex(i, j), b = vertex(i, j + 1), c = vertex(i + 1, j + 1), d = vertex(i + 1, j);
-      for (const std::uint32_t corner : {a, b, c, a, c, d}) piece.indices.push_back(corner);
+      for (const std::uint32_t corner : {a, c, b, a, d, c}) piece.indices.push_back(corner);
     }
   }
 }
@@ -97,7 +97,11 @@ std::vector<Piece> column_scene() {
 std::vector<Piece> room_scene() {
   Piece white{.name = "white", .color = {0.73F, 0.73F, 0.73F}};
   add_quads(white, {-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, {4, 4});  // floor
-  add_quads(white, {-2, 3, -2}, {4, 0, 0}, {0, 0, 4}, {4, 4});  // ceiling
+  // The ceiling leaves a square open in which the lamp lies flush: no gap, no light behind it.
+  add_quads(white, {-2, 3, -2}, {4, 0, 0}, {0, 0, 1.4F}, {4, 2});
+  add_quads(white, {-2, 3, 0.6F}, {4, 0, 0}, {0, 0, 1.4F}, {4, 2});
+  add_quads(white, {-2, 3, -0.6F}, {1.4F, 0, 0}, {0, 0, 1.2F}, {2, 1});
+  add_quads(white, {0.6F, 3, -0.6F}, {1.4F, 0, 0}, {0, 0, 1.2F}, {2, 1});
   add_quads(white, {-2, 0, -2}, {4, 0, 0}, {0, 3, 0}, {4, 3});  // far wall
   add_quads(white, {2, 0, 2}, {-4, 0, 0}, {0, 3, 0}, {4, 3});   // near wall, seen through from outside
   add_standing_box(white, {-0.4F, 0, -1.2F}, {0.9F, 1.5F, 0.0F}, 2);
@@ -106,7 +110,7 @@ std::vector<Piece> room_scene() {
   Piece green{.name = "green", .color = {0.14F, 0.45F, 0.091F}};
   add_quads(green, {2, 0, -2}, {0, 0, 4}, {0, 3, 0}, {4, 3});
   Piece lamp{.name = "lamp", .color = {0, 0, 0}, .emission = 12};
-  add_quads(lamp, {-0.6F, 2.98F, -0.6F}, {1.2F, 0, 0}, {0, 0, 1.2F}, {1, 1});
+  add_quads(lamp, {-0.6F, 3, -0.6F}, {1.2F, 0, 0}, {0, 0, 1.2F}, {1, 1});
   return {white, red, green, lamp};
 }
 

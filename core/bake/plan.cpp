@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "core/mesh/topology.h"
+#include "core/bake/bounce_tail.h"
 #include "core/sphere/sh.h"
-#include "core/trace/surface.h"
+#include "core/trace/tracer.h"
 
 namespace kiln {
 namespace {
@@ -21,9 +21,9 @@ struct Grade {
   int bits;
 };
 constexpr std::array<Grade, 3> kGrades = {{
-    {"draft", 4, 256, 64, 36, 0.05, 10'000, 2e-4F, 10},
-    {"standard", 6, 1024, 256, 100, 0.02, 40'000, 5e-5F, 12},
-    {"final", 6, 4096, 1024, 400, 0.005, 160'000, 1e-5F, 14},
+    {"draft", 4, 256, 64, 36, 0.03, 10'000, 2e-4F, 10},
+    {"standard", 6, 1024, 256, 100, 0.01, 40'000, 5e-5F, 12},
+    {"final", 6, 4096, 1024, 400, 0.002, 160'000, 1e-5F, 14},
 }};
 
 /// Measured on the machine of core/prt/README.md, one thread: million rays a second, and bytes a vertex.
@@ -58,16 +58,17 @@ void plan_order(Plan& plan, const PrtStep& step, const Grade& grade) {
                           " bands of distant light");
 }
 
-/// The fewest reflections whose tail rho^(b+1) stays below the grade's share: an upper bound, as light also escapes.
-void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Grade& grade) {
-  const double rho = mean_albedo(scene);
-  int bounces = 0;
-  while (bounces < 16 && std::pow(rho, bounces + 1) > grade.tail) ++bounces;
-  std::string reason = "at a mean albedo of " + text(rho) + " reflections beyond carry less than " +
-                       text(100 * grade.tail) + " % of the light";
-  if (rho <= 0) reason = "all surfaces are black: nothing can be lit indirectly";
-  plan.bounces = step.bounces.value_or(bounces);
-  decide(plan, "bounces", std::to_string(plan.bounces), step.bounces ? kAsked : reason);
+void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Grade& grade, Threads& threads) {
+  if (step.bounces) {
+    plan.bounces = *step.bounces;
+    return decide(plan, "bounces", std::to_string(plan.bounces), kAsked);
+  }
+  const BounceTail tail = measure_bounces(Tracer(scene, threads), plan.lamps, grade.tail, threads);
+  plan.bounces = tail.bounces;
+  decide(plan, "bounces", std::to_string(plan.bounces),
+         plan.bounces == 0 && tail.left == 0
+             ? "no path finds light by reflection"
+             : "sample paths bring " + text(100 * tail.left) + " % of the light in later reflections");
 }
 
 void plan_samples(Plan& plan, const PrtStep& step, const Grade& grade) {
@@ -124,27 +125,16 @@ Prediction predict(const Plan& plan, const Scene& scene, int threads) {
 
 }  // namespace
 
-float mean_albedo(const Scene& scene) {
-  double sum = 0, area = 0;
-  for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
-    const double weight = triangle_area(scene.mesh, scene.mesh.triangles[t]);
-    const Vec3f rho = albedo_at(scene, surface_point(scene, t, 1.0F / 3, 1.0F / 3));
-    sum += weight * std::max({rho.x, rho.y, rho.z});
-    area += weight;
-  }
-  return area > 0 ? static_cast<float>(sum / area) : 0.0F;
-}
-
-Plan make_plan(const Scene& scene, const PrtStep& step, Quality quality, int threads) {
+Plan make_plan(const Scene& scene, const PrtStep& step, Quality quality, Threads& threads) {
   const Grade& grade = kGrades[static_cast<std::size_t>(quality)];
   Plan plan;
   plan_order(plan, step, grade);
   plan_lamps(plan, scene);
-  plan_bounces(plan, scene, step, grade);
+  plan_bounces(plan, scene, step, grade, threads);
   plan_samples(plan, step, grade);
   plan_subdivision(plan, scene, step.subdivide, grade);
   decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
-  plan.prediction = predict(plan, scene, threads);
+  plan.prediction = predict(plan, scene, threads.count());
   return plan;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/bake/recipe.h"
+#include "core/base/threads.h"
 #include "core/prt/subdivide.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
@@ -41,10 +42,7 @@ struct Plan {
   Prediction prediction;
 };
 
-/// Area-weighted mean of the largest albedo channel; decides how many reflections matter.
-float mean_albedo(const Scene&);
-
-/// `threads` only scales the predicted seconds.
-Plan make_plan(const Scene&, const PrtStep&, Quality, int threads);
+/// Traces a few thousand paths to see how many reflections matter, unless the step says.
+Plan make_plan(const Scene&, const PrtStep&, Quality, Threads&);
 
 }  // namespace kiln

@@ -16,25 +16,38 @@ struct Camera {
   Vec3f eye, forward, right, up;  // right and up scaled to half the picture's extent at distance 1
 };
 
-/// Looks at the middle of the bounding box from a little above, far enough to hold its sphere.
-Camera frame_camera(const Mesh& mesh, const Preview& preview) {
+struct Box {
   Vec3f low{1, 1, 1}, high{-1, -1, -1};
+};
+
+Box bounds_of(const Mesh& mesh) {
+  Box box;
   for (const Vec3f& p : mesh.position) {
     for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], p[k]);
-      high[k] = std::max(high[k], p[k]);
+      box.low[k] = std::min(box.low[k], p[k]);
+      box.high[k] = std::max(box.high[k], p[k]);
     }
   }
+  return box;
+}
+
+/// Looks at the middle of the bounding box from a little above, just far enough to hold its eight corners.
+Camera frame_camera(const Mesh& mesh, const Preview& preview) {
   constexpr float kHalfView = 0.32F;  // tangent of half the vertical angle
-  const float radius = std::max(length(high - low) / 2, 1e-3F);
-  const Vec3f back = normalized(Vec3f{0.45F, 0.42F, 0.9F});
-  Camera camera;
-  camera.forward = -back;
-  camera.eye = (low + high) * 0.5F + back * (0.88F * radius / std::sin(std::atan(kHalfView)));
-  camera.right = normalized(cross(camera.forward, {0, 1, 0})) *
-                 (kHalfView * static_cast<float>(preview.width) / static_cast<float>(preview.height));
-  camera.up = normalized(cross(camera.right, camera.forward)) * kHalfView;
-  return camera;
+  constexpr float kMargin = 1.06F;
+  const float aspect = static_cast<float>(preview.width) / static_cast<float>(preview.height);
+  const Box box = bounds_of(mesh);
+  const Vec3f middle = (box.low + box.high) * 0.5F, back = normalized(Vec3f{0.45F, 0.42F, 0.9F});
+  const Vec3f right = normalized(cross(-back, {0, 1, 0})), up = normalized(cross(right, -back));
+  float distance = 1e-3F;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3f p = Vec3f{corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
+                          corner & 4 ? box.high.z : box.low.z} -
+                    middle;
+    const float across = std::abs(dot(p, right)) / (kHalfView * aspect), along = std::abs(dot(p, up)) / kHalfView;
+    distance = std::max(distance, dot(p, back) + kMargin * std::max(across, along));
+  }
+  return {middle + back * distance, -back, right * (kHalfView * aspect), up * kHalfView};
 }
 
 /// The first face that looks at the camera, passing through those that look away.

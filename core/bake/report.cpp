@@ -69,6 +69,7 @@ ordered_json certificate_object(const std::optional<Certificate>& certificate) {
     out["lightings"].push_back(
         {{"name", certificate->lightings[i]}, {"relrmse", certificate->transport.by_lighting[i]}});
   }
+  out["dark"] = certificate->dark;
   if (certificate->truncation) out["truncation"] = error_object(*certificate->truncation);
   out["seconds"] = certificate->seconds;
   return out;

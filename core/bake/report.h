@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
 #include "core/bake/plan.h"
@@ -20,7 +21,7 @@ struct ReportInput {
   const BakeLog& log;
   const Mesh& result;  // as delivered
   std::uint64_t result_bytes = 0;
-  std::vector<std::pair<std::string, std::uint64_t>> streams;  // bytes of each attribute stream
+  const std::vector<StreamBytes>& streams;
   const std::optional<Certificate>& certificate;
 };
 
