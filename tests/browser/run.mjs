@@ -9,7 +9,8 @@ const [file] = process.argv.slice(2);
 const here = fileURLToPath(new URL('.', import.meta.url));
 const needsBrowser = !['light.test.mjs', 'types.test.mjs'].includes(file);
 const packages = existsSync(`${here}../../web_viewer/node_modules/vite`);
-const missing = needsBrowser ? whatIsMissing() : packages ? null : 'web_viewer/node_modules is missing: cd web_viewer && npm ci';
+const noServer = file === 'server.test.mjs' && !existsSync(process.env.KILND ?? '') ? 'kilnd is not built' : null;
+const missing = noServer ?? (needsBrowser ? whatIsMissing() : packages ? null : 'web_viewer/node_modules is missing: cd web_viewer && npm ci');
 if (missing) {
   console.log(`SKIPPED: ${missing}`);
   process.exit(77);

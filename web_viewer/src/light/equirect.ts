@@ -72,12 +72,12 @@ export function lightToEquirect(order: number, light: ArrayLike<number>, width: 
   return functionToEquirect(radiance, width);
 }
 
-/// The light blurred so that it does not ring: band l times sinc(pi l / order) (Lanczos's factors).
+/// The light blurred by de la Vallee Poussin's kernel, band l times n!^2 / ((n - l)! (n + l)!) with n = order - 1.
+/// The kernel is nowhere negative: light that was positive before it was cut to harmonics is so again.
 export function softened(order: number, light: ArrayLike<number>): Float32Array {
-  return Float32Array.from({ length: 3 * shCount(order) }, (_, i) => {
-    const at = (Math.PI * Math.floor(Math.sqrt(Math.floor(i / 3)))) / order;
-    return light[i] * (at === 0 ? 1 : Math.sin(at) / at);
-  });
+  const factors = [1];
+  for (let l = 1; l < order; ++l) factors.push((factors[l - 1] * (order - l)) / (order - 1 + l));
+  return Float32Array.from({ length: 3 * shCount(order) }, (_, i) => light[i] * factors[Math.floor(Math.sqrt(Math.floor(i / 3)))]);
 }
 
 /// Halves a map until it is at most `width` wide: each 2 x 2 block becomes its mean, weighted by solid angle.

@@ -77,7 +77,13 @@ function properties(schema: Schema | undefined): HTMLElement | null {
   return table(['Field', 'Type', 'Meaning'], rows);
 }
 
+/// The last column is left out where it says nothing.
 function table(heads: string[], rows: HTMLElement[]): HTMLElement {
+  if (rows.every((row) => row.lastElementChild?.textContent === '')) {
+    for (const row of rows) row.lastElementChild?.remove();
+    heads = heads.slice(0, -1);
+  }
+
   return h('div', { class: 'table-scroll', tabindex: 0, role: 'region', 'aria-label': heads.join(', ') }, h('table', {}, h('thead', {}, h('tr', {}, ...heads.map((head) => h('th', { scope: 'col' }, head)))), h('tbody', {}, ...rows)));
 }
 
@@ -89,9 +95,10 @@ function parameterTable(list: Parameter[]): HTMLElement | null {
   return table(['Parameter', 'In', 'Type', 'Meaning'], rows);
 }
 
-function bodies(content: Content | undefined): HTMLElement[] {
+/// `detailed`: with the fields of each schema.
+function bodies(content: Content | undefined, detailed: boolean): HTMLElement[] {
   return Object.entries(content ?? {}).map(([media, { schema, example }]) =>
-    h('div', { class: 'body' }, h('code', {}, media), schema ? ` ${typeName(schema)}` : '', properties(schema), example === undefined ? null : h('pre', { tabindex: 0 }, JSON.stringify(example, null, 2))),
+    h('div', { class: 'body' }, h('code', {}, media), schema ? ` ${typeName(schema)}` : '', detailed ? properties(schema) : null, example === undefined ? null : h('pre', { tabindex: 0 }, JSON.stringify(example, null, 2))),
   );
 }
 
@@ -99,7 +106,7 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
   const request = op.requestBody && resolve(op.requestBody);
   const answers = Object.entries(op.responses ?? {}).map(([status, raw]) => {
     const answer = resolve(raw);
-    return h('li', {}, h('strong', {}, status), ` ${answer.description ?? ''}`, ...bodies(answer.content));
+    return h('li', {}, h('strong', {}, status), ` ${answer.description ?? ''}`, ...bodies(answer.content, status.startsWith('2')));
   });
   const curl = `curl${method === 'get' ? '' : ` -X ${method.toUpperCase()}`} '${location.origin}${path}'`;
   return h(
@@ -110,7 +117,7 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
     parameterTable([...shared, ...(op.parameters ?? [])]),
     request ? h('h2', {}, 'Body') : null,
     request?.description ? h('p', {}, request.description) : null,
-    ...bodies(request?.content),
+    ...bodies(request?.content, true),
     answers.length ? h('h2', {}, 'Answers') : null,
     h('ul', { class: 'answers' }, ...answers),
     h('p', { class: 'curl' }, h('code', {}, curl), ' ', h('button', { type: 'button', 'aria-label': `Copy the command for ${method} ${path}`, onclick: () => void copyText(curl, 'Command') }, 'Copy')),

@@ -1,7 +1,7 @@
 // The lights a viewer can choose from, as SH coefficients of one order, before rotation and intensity.
 
 import { functionToEquirect, lightToEquirect, softened, type EquirectMap } from '../light/equirect';
-import { kSkies, projectSky, skyPicture, type Sun } from '../light/skies';
+import { kSkies, projectSky, skyPicture, type Sky, type Sun } from '../light/skies';
 import { rotateAboutY, withOrder } from '../light/sh';
 
 export interface LightChoice {
@@ -11,6 +11,7 @@ export interface LightChoice {
 
 const kHarmonicsWidth = 128; // SH of order 10 resolve 20 degrees; 128 texels are 2.8 degrees apart
 const kSkyWidth = 512;
+const kSameSky = 0.02; // core spreads the sun over texels of a map, we take a point: they differ by 0.0008 at order 4
 
 export class Lights {
   private readonly known = new Map<string, Float32Array>();
@@ -23,7 +24,7 @@ export class Lights {
   constructor(
     readonly order: number,
     baked: Float32Array,
-    bakedName: string,
+    private readonly bakedName: string,
   ) {
     this.known.set('baked', withOrder(baked, order));
     this.choices.push({ id: 'baked', label: baked.length > 0 ? `As baked: ${bakedName || 'environment'}` : 'As baked: no sky, lamps only' });
@@ -57,17 +58,29 @@ export class Lights {
 
   /// What three's image-based light gets: no suns (its filter loses small bright spots; they come as lamps) and no detail.
   reflection(id: string): { picture: EquirectMap; suns: readonly Sun[] } {
-    const sky = kSkies.find((one) => one.id === id);
+    const sky = this.skyOf(id);
     if (sky) return { picture: functionToEquirect(sky.radiance, kSkyWidth), suns: sky.suns };
     return { picture: lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth), suns: [] };
   }
 
-  /// A picture of the light: its harmonics as they are, or the sky itself. Of the baked light only harmonics are known;
-  /// they are softened then.
+  /// A picture of the light: its harmonics as they are, or the sky itself. Where only harmonics are known they are softened.
   picture(id: string, harmonics: boolean): EquirectMap {
     if (harmonics) return lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth);
     if (id === 'file' && this.map) return this.map;
-    const sky = kSkies.find((one) => one.id === id);
+    const sky = this.skyOf(id);
     return sky ? skyPicture(sky, kSkyWidth) : lightToEquirect(this.order, softened(this.order, this.coefficients(id)), kHarmonicsWidth);
   }
+
+  /// The formula behind a light. A bake says only the name of its sky; it is believed when the coefficients agree.
+  private skyOf(id: string): Sky | undefined {
+    if (id !== 'baked') return kSkies.find((one) => one.id === id);
+    const named = kSkies.find((one) => one.id === this.bakedName);
+    return named && relativeDistance(this.coefficients(named.id), this.coefficients('baked')) < kSameSky ? named : undefined;
+  }
+}
+
+function relativeDistance(a: Float32Array, b: Float32Array): number {
+  let [difference, size] = [0, 0];
+  for (let i = 0; i < a.length; ++i) [difference, size] = [difference + (a[i] - b[i]) ** 2, size + b[i] ** 2];
+  return size > 0 ? Math.sqrt(difference / size) : 1;
 }
