@@ -8,7 +8,7 @@
 namespace kiln {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;  // what a person reads first comes first
 
 std::string dump(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 

@@ -56,6 +56,9 @@ std::string openapi_json() {
   for (const Endpoint& endpoint : endpoints())
     document["paths"][std::string(endpoint.path)][lower(endpoint.method)] = operation(endpoint);
   document["components"] = Json::parse(openapi_components());
+  document["components"]["securitySchemes"] = {{"bearer", {{"type", "http"}, {"scheme", "bearer"}}},
+                                               {"basic", {{"type", "http"}, {"scheme", "basic"}}}};
+  document["security"] = {Json::object(), {{"bearer", Json::array()}}, {{"basic", Json::array()}}};
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

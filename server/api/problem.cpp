@@ -8,7 +8,7 @@
 namespace kiln {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;  // what a person reads first comes first
 
 constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"malformed_request", 400},

@@ -303,6 +303,7 @@ Result<int> Front::bind() {
 void Front::run() {
   State& s = *state_;
   std::vector<std::jthread> workers;
+  workers.reserve(static_cast<std::size_t>(s.options.threads));
   for (int i = 0; i < s.options.threads; ++i) workers.emplace_back([&s] { s.work(); });
   s.watch(s.wake);
   s.watch(s.listener.fd);
