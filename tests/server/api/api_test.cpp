@@ -183,6 +183,7 @@ TEST(HeaderFields, RangesNearTheEdges) {
 TEST(OpenApi, EveryReferenceResolvesAndEveryPathParameterIsDescribed) {
   const json document = json::parse(openapi_json());
   EXPECT_EQ(document["openapi"], "3.1.0");
+  EXPECT_TRUE(document["security"].is_array() && document["security"][1].contains("bearer"));
   const std::function<void(const json&)> check = [&](const json& node) {
     if (node.is_object() && node.contains("$ref")) {
       const std::string target = node["$ref"];
