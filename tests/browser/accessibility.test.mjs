@@ -27,9 +27,17 @@ const kPages = {
       await until(page, () => !document.querySelector('.legend').hidden);
     },
   },
-  'help dialog': { path: view, wait: () => document.documentElement.dataset.ready === 'true', act: (page) => page.keyboard.press('h') },
+  'help dialog': {
+    path: view,
+    wait: () => document.documentElement.dataset.ready === 'true',
+    act: (page) => page.keyboard.press('h'),
+  },
   'a job that is not there': { path: '/view/none', wait: () => document.querySelector('.overlay .problem') !== null },
-  docs: { path: '/docs', wait: () => document.querySelectorAll('.operation').length > 0, act: (page) => page.locator('summary').first().click() },
+  docs: {
+    path: '/docs',
+    wait: () => document.querySelectorAll('.operation').length > 0,
+    act: (page) => page.locator('summary').first().click(),
+  },
 };
 
 /// axe itself may not be injected as a script: the policy forbids it. Playwright evaluates it outside the policy.
@@ -55,7 +63,14 @@ test('every page has one main landmark, one h1 and a title', async () => {
   for (const { path, wait } of Object.values(kPages)) {
     const page = await openPage(browser, mock.url + path);
     await until(page, wait);
-    assert.deepEqual(await page.evaluate(() => [document.querySelectorAll('main').length, document.querySelectorAll('h1').length, document.title !== '']), [1, 1, true]);
+    assert.deepEqual(
+      await page.evaluate(() => [
+        document.querySelectorAll('main').length,
+        document.querySelectorAll('h1').length,
+        document.title !== '',
+      ]),
+      [1, 1, true],
+    );
     await page.context().close();
   }
 });
@@ -85,8 +100,13 @@ test('keyboard alone reaches the model, the settings and the help', async () => 
   const reached = new Set();
   for (let i = 0; i < 40; ++i) {
     await page.keyboard.press('Tab');
-    reached.add(await page.evaluate(() => document.activeElement.id || document.activeElement.className || document.activeElement.textContent));
+    reached.add(
+      await page.evaluate(
+        () => document.activeElement.id || document.activeElement.className || document.activeElement.textContent,
+      ),
+    );
   }
-  for (const id of ['stage', 'Help', 'c-light', 'c-rotation', 'c-ev', 'c-mode', 'c-wire']) assert.ok(reached.has(id), `${id} in ${[...reached].join(', ')}`);
+  for (const id of ['stage', 'Help', 'c-light', 'c-rotation', 'c-ev', 'c-mode', 'c-wire'])
+    assert.ok(reached.has(id), `${id} in ${[...reached].join(', ')}`);
   await page.context().close();
 });

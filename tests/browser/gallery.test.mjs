@@ -16,7 +16,11 @@ async function withGallery(act, options) {
   mock = await startMock();
   const page = await openPage(browser, mock.url, options);
   try {
-    await until(page, () => document.querySelectorAll('.card').length >= 6 && document.querySelector('.connection').dataset.live === 'true');
+    await until(
+      page,
+      () =>
+        document.querySelectorAll('.card').length >= 6 && document.querySelector('.connection').dataset.live === 'true',
+    );
     await act(page);
     assert.deepEqual(page.faults, []);
     assert.deepEqual(await page.evaluate(() => window.violations), []);
@@ -71,7 +75,11 @@ test('filters by status and label hide the others and say when none is left', ()
 test('cancel and delete do what they say', () =>
   withGallery(async (page) => {
     await card(page, 'running').getByRole('button', { name: 'Cancel' }).click();
-    await until(page, (id) => document.querySelector(`[data-job="${id}"]`).dataset.status === 'canceled', jobId('running'));
+    await until(
+      page,
+      (id) => document.querySelector(`[data-job="${id}"]`).dataset.status === 'canceled',
+      jobId('running'),
+    );
     await card(page, 'failed').getByRole('button', { name: 'Delete' }).click();
     await until(page, (id) => !document.querySelector(`[data-job="${id}"]`), jobId('failed'));
     assert.ok(!mock.jobs.has(jobId('failed')));
@@ -81,7 +89,9 @@ test('a chosen model is uploaded with the chosen preset', () =>
   withGallery(async (page) => {
     await page.selectOption('#preset', 'draft');
     await page.setInputFiles('#model', { name: 'teapot.glb', mimeType: 'model/gltf-binary', buffer: Buffer.alloc(64) });
-    await until(page, () => [...document.querySelectorAll('.card h3')].some((title) => title.textContent === 'teapot.glb'));
+    await until(page, () =>
+      [...document.querySelectorAll('.card h3')].some((title) => title.textContent === 'teapot.glb'),
+    );
     assert.equal([...mock.jobs.values()].at(-1).recipe.preset, 'draft');
   }));
 
@@ -98,7 +108,9 @@ test('a dropped model starts a job; a refusal is shown in the server’s words',
         [name, bytes],
       );
     await drop('dropped.glb', 64);
-    await until(page, () => [...document.querySelectorAll('.card h3')].some((title) => title.textContent === 'dropped.glb'));
+    await until(page, () =>
+      [...document.querySelectorAll('.card h3')].some((title) => title.textContent === 'dropped.glb'),
+    );
     await drop('short.glb', 3);
     await until(page, () => /shorter than a GLB header/.test(document.querySelector('.uploads').textContent));
     page.faults.length = 0; // the browser logs the 422 itself
@@ -110,7 +122,11 @@ test('the connection mends itself and catches up with what happened meanwhile', 
   withGallery(async (page) => {
     mock.jobs.get(jobId('queued')).status = 'canceled'; // said to nobody
     for (const stream of mock.streams) stream.end();
-    await until(page, (id) => document.querySelector(`[data-job="${id}"]`).dataset.status === 'canceled', jobId('queued'));
+    await until(
+      page,
+      (id) => document.querySelector(`[data-job="${id}"]`).dataset.status === 'canceled',
+      jobId('queued'),
+    );
     assert.equal(await page.locator('.connection').innerText(), 'live');
     page.faults.length = 0; // the browser may log the lost stream
   }));

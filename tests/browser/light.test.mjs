@@ -6,13 +6,14 @@ import { load } from './sources.mjs';
 
 const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCount } = await load('light/sh.ts');
 const { sphereQuadrature } = await load('light/quadrature.ts');
-const { directionAt, projectEquirect, shrinkEquirect } = await load('light/equirect.ts');
+const { directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
 const { decodeAttributes, relight, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
 const { kSkies, projectSky } = await load('light/skies.ts');
 const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
 const { edgesOf } = await load('main/wireframe.ts');
 
-const near = (actual, expected, tolerance, what) => assert.ok(Math.abs(actual - expected) <= tolerance, `${what ?? ''} ${actual} is not ${expected} within ${tolerance}`);
+const near = (actual, expected, tolerance, what) =>
+  assert.ok(Math.abs(actual - expected) <= tolerance, `${what ?? ''} ${actual} is not ${expected} within ${tolerance}`);
 const kFloat = 1e-6; // results are float32; sums of a few hundred terms near 1
 const shAt = (order, x, y, z) => {
   const out = new Float64Array(order * order);
@@ -30,7 +31,13 @@ test('the first four harmonics have the constants and signs of core/sphere/sh.h'
 test('second-band harmonics are xy, yz, 3z^2-1, xz, x^2-y^2 without Condon-Shortley signs', () => {
   const [x, y, z] = unit(0.5, 0.7, -0.2);
   const a = Math.sqrt(15 / Math.PI) / 2;
-  const expected = [a * x * y, a * y * z, (Math.sqrt(5 / Math.PI) / 4) * (3 * z * z - 1), a * x * z, (a / 2) * (x * x - y * y)];
+  const expected = [
+    a * x * y,
+    a * y * z,
+    (Math.sqrt(5 / Math.PI) / 4) * (3 * z * z - 1),
+    a * x * z,
+    (a / 2) * (x * x - y * y),
+  ];
   const sh = shAt(3, x, y, z);
   expected.forEach((value, i) => near(sh[4 + i], value, 1e-12));
 });
@@ -55,13 +62,23 @@ test('an unoccluded plane under a constant map of radiance 1 has value exactly 1
 });
 
 test('a constant sky by formula gives exactly sqrt(4 pi) in band 0 and nothing else', () => {
-  const light = projectSky(kSkies.find(({ id }) => id === 'constant'), 5);
+  const light = projectSky(
+    kSkies.find(({ id }) => id === 'constant'),
+    5,
+  );
   for (let i = 0; i < light.length; ++i) near(light[i], i < 3 ? Math.sqrt(4 * Math.PI) : 0, kFloat);
 });
 
-for (const [axis, index, direction] of [['x', 3, [1, 0, 0]], ['y', 1, [0, 1, 0]], ['z', 2, [0, 0, 1]]]) {
+for (const [axis, index, direction] of [
+  ['x', 3, [1, 0, 0]],
+  ['y', 1, [0, 1, 0]],
+  ['z', 2, [0, 0, 1]],
+]) {
   test(`light from +${axis} has a positive coefficient ${index}, and lights planes that face it`, () => {
-    const [u, v] = [0.5 + Math.atan2(direction[2], direction[0]) / (2 * Math.PI), 0.5 - Math.asin(direction[1]) / Math.PI];
+    const [u, v] = [
+      0.5 + Math.atan2(direction[2], direction[0]) / (2 * Math.PI),
+      0.5 - Math.asin(direction[1]) / Math.PI,
+    ];
     const back = directionAt(u, v);
     near(back.x * direction[0] + back.y * direction[1] + back.z * direction[2], 1, 1e-12);
     const [width, height] = [64, 32];
@@ -73,8 +90,18 @@ for (const [axis, index, direction] of [['x', 3, [1, 0, 0]], ['y', 1, [0, 1, 0]]
     const light = projectEquirect({ width, height, stride: 3, data }, 4);
     assert.ok(light[3 * index] > 0.5, `coefficient ${index} is ${light[3 * index]}`);
     for (const other of [1, 2, 3].filter((i) => i !== index)) near(light[3 * other], 0, 0.02 * light[3 * index]); // texel steps
-    const facing = relight({ order: 4, channels: 1, fixed: false, slots: 16 }, clampedCosineTransfer(4, ...direction), light, true)[0];
-    const averted = relight({ order: 4, channels: 1, fixed: false, slots: 16 }, clampedCosineTransfer(4, ...direction.map((d) => -d)), light, true)[0];
+    const facing = relight(
+      { order: 4, channels: 1, fixed: false, slots: 16 },
+      clampedCosineTransfer(4, ...direction),
+      light,
+      true,
+    )[0];
+    const averted = relight(
+      { order: 4, channels: 1, fixed: false, slots: 16 },
+      clampedCosineTransfer(4, ...direction.map((d) => -d)),
+      light,
+      true,
+    )[0];
     assert.ok(facing > 10 * Math.abs(averted), `${facing} against ${averted}`);
   });
 }
@@ -86,11 +113,22 @@ test('turning the light by 90 degrees takes +Z to +X', () => {
 });
 
 test('turning by any angle keeps each band’s power, and full circles change nothing', () => {
-  const light = projectSky(kSkies.find(({ id }) => id === 'studio'), 7);
+  const light = projectSky(
+    kSkies.find(({ id }) => id === 'studio'),
+    7,
+  );
   const power = (l, of) => of.slice(3 * l * l, 3 * (l + 1) ** 2).reduce((sum, v) => sum + v * v, 0);
   const turned = rotateAboutY(7, light, 73);
   for (let l = 0; l < 7; ++l) near(power(l, turned), power(l, light), 1e-5 * (1 + power(l, light)));
   rotateAboutY(7, light, 360).forEach((value, i) => near(value, light[i], 1e-5));
+});
+
+test('softened light of a sun is nowhere negative, and keeps its sum', () => {
+  const sun = Float32Array.from({ length: 3 * 36 }, (_, i) => shAt(6, 0.6, 0.64, 0.48)[Math.floor(i / 3)]);
+  const least = (light) => Math.min(...lightToEquirect(6, light, 64).data);
+  assert.ok(least(sun) < -0.1, 'without softening it rings');
+  assert.ok(least(softened(6, sun)) > -1e-6);
+  near(softened(6, sun)[0], sun[0], 0);
 });
 
 test('halving a map keeps its integral', () => {
@@ -103,11 +141,18 @@ test('halving a map keeps its integral', () => {
 
 test('attributes decode to offset + scale * stored, four flat slots each, zero padding ignored', () => {
   const shape = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
-  const attributes = [Float32Array.of(0.1, 0.2, 0.3, 0.4, -0.1, -0.2, -0.3, -0.4), Float32Array.of(0.5, 0.6, 9, 9, -0.5, -0.6, 9, 9)];
-  const [scale, offset] = [[1, 2, 3, 4, 5, 6], [10, 20, 30, 40, 50, 60]];
+  const attributes = [
+    Float32Array.of(0.1, 0.2, 0.3, 0.4, -0.1, -0.2, -0.3, -0.4),
+    Float32Array.of(0.5, 0.6, 9, 9, -0.5, -0.6, 9, 9),
+  ];
+  const [scale, offset] = [
+    [1, 2, 3, 4, 5, 6],
+    [10, 20, 30, 40, 50, 60],
+  ];
   const out = decodeAttributes(shape, attributes, scale, offset);
   const stored = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-  for (let v = 0; v < 2; ++v) stored.forEach((s, slot) => near(out[6 * v + slot], offset[slot] + scale[slot] * (v === 0 ? s : -s), 1e-5));
+  for (let v = 0; v < 2; ++v)
+    stored.forEach((s, slot) => near(out[6 * v + slot], offset[slot] + scale[slot] * (v === 0 ? s : -s), 1e-5));
 });
 
 test('grey transfer lights each channel by its own light; lamps can be put out', () => {
@@ -134,7 +179,13 @@ test('the measure of a triangle is the sum of its edges’ transfer distances; l
 });
 
 test('a quantile bounds its share of the values', () => {
-  assert.equal(quantile(Float32Array.from({ length: 100 }, (_, i) => i), 0.99), 99);
+  assert.equal(
+    quantile(
+      Float32Array.from({ length: 100 }, (_, i) => i),
+      0.99,
+    ),
+    99,
+  );
   assert.equal(quantile(new Float32Array(0), 0.5), 0);
 });
 
@@ -144,13 +195,27 @@ test('each edge of a quad is drawn once', () => {
 });
 
 test('the state survives the address, and defaults leave it empty', () => {
-  const state = { ...kDefaultState, light: 'clear', rotation: -42, ev: 1.5, wire: true, mode: 'coefficient', slot: 7, compare: 0.25, pose: [1, 2, 3.5, 0, -0.25, 0] };
+  const state = {
+    ...kDefaultState,
+    light: 'clear',
+    rotation: -42,
+    ev: 1.5,
+    wire: true,
+    mode: 'coefficient',
+    slot: 7,
+    compare: 0.25,
+    pose: [1, 2, 3.5, 0, -0.25, 0],
+  };
   assert.deepEqual(decodeState(encodeState(state), ['baked', 'clear']), state);
   assert.equal(encodeState(kDefaultState), '');
 });
 
 test('an address of nonsense gives the defaults', () => {
-  assert.deepEqual(decodeState('light=<script>&ev=NaN&mode=7&pose=1,2&rotation=Infinity&compare=&slot=-3', ['baked']), { ...kDefaultState, compare: 0, slot: 0 });
+  assert.deepEqual(decodeState('light=<script>&ev=NaN&mode=7&pose=1,2&rotation=Infinity&compare=&slot=-3', ['baked']), {
+    ...kDefaultState,
+    compare: 0,
+    slot: 0,
+  });
 });
 
 test('numbers outside their range are moved to its end', () => {

@@ -10,7 +10,11 @@ const { clampedCosineTransfer } = await load('light/sh.ts');
 function field(side, order) {
   const vertices = side * side;
   const slots = 3 * order * order;
-  const [position, normal, transfer] = [new Float32Array(3 * vertices), new Float32Array(3 * vertices), new Float32Array(slots * vertices)];
+  const [position, normal, transfer] = [
+    new Float32Array(3 * vertices),
+    new Float32Array(3 * vertices),
+    new Float32Array(slots * vertices),
+  ];
   const height = (x, z) => 0.06 * Math.sin(9 * x) * Math.cos(7 * z) + 0.02 * Math.sin(31 * x + 17 * z);
   for (let v = 0; v < vertices; ++v) {
     const [x, z] = [(v % side) / (side - 1) - 0.5, Math.floor(v / side) / (side - 1) - 0.5];
@@ -20,7 +24,8 @@ function field(side, order) {
     normal.set(n, 3 * v);
     const open = 0.75 + 4 * height(x, z); // valleys see less of the sky
     const t = clampedCosineTransfer(order, ...n);
-    for (let c = 0; c < 3; ++c) for (let i = 0; i < t.length; ++i) transfer[slots * v + c * t.length + i] = t[i] * open * (1 - 0.05 * c);
+    for (let c = 0; c < 3; ++c)
+      for (let i = 0; i < t.length; ++i) transfer[slots * v + c * t.length + i] = t[i] * open * (1 - 0.05 * c);
   }
   const indices = new Uint32Array(6 * (side - 1) ** 2);
   for (let q = 0, at = 0; q < (side - 1) ** 2; ++q) {
@@ -35,15 +40,18 @@ function packSlots({ vertices, slots, transfer }) {
   const [scale, offset, packed] = [[], [], []];
   for (let s = 0; s < slots; ++s) {
     let [low, high] = [Infinity, -Infinity];
-    for (let v = 0; v < vertices; ++v) [low, high] = [Math.min(low, transfer[v * slots + s]), Math.max(high, transfer[v * slots + s])];
+    for (let v = 0; v < vertices; ++v)
+      [low, high] = [Math.min(low, transfer[v * slots + s]), Math.max(high, transfer[v * slots + s])];
     offset.push((low + high) / 2);
     scale.push((high - low) / 2 || 1);
   }
   for (let k = 0; 4 * k < slots; ++k) {
-    packed.push(Float32Array.from({ length: 4 * vertices }, (_, j) => {
-      const slot = 4 * k + (j & 3);
-      return slot < slots ? (transfer[(j >> 2) * slots + slot] - offset[slot]) / scale[slot] : 0;
-    }));
+    packed.push(
+      Float32Array.from({ length: 4 * vertices }, (_, j) => {
+        const slot = 4 * k + (j & 3);
+        return slot < slots ? (transfer[(j >> 2) * slots + slot] - offset[slot]) / scale[slot] : 0;
+      }),
+    );
   }
   return { scale, offset, packed };
 }
@@ -52,8 +60,13 @@ async function compress({ vertices, indices, position, normal }, packed) {
   const draco = await fromViewer('draco3dgltf').createEncoderModule({});
   const [builder, mesh] = [new draco.MeshBuilder(), new draco.Mesh()];
   builder.AddFacesToMesh(mesh, indices.length / 3, indices);
-  const ids = { POSITION: builder.AddFloatAttributeToMesh(mesh, draco.POSITION, vertices, 3, position), NORMAL: builder.AddFloatAttributeToMesh(mesh, draco.NORMAL, vertices, 3, normal) };
-  packed.forEach((values, k) => (ids[`_PRT_${k}`] = builder.AddFloatAttributeToMesh(mesh, draco.GENERIC, vertices, 4, values)));
+  const ids = {
+    POSITION: builder.AddFloatAttributeToMesh(mesh, draco.POSITION, vertices, 3, position),
+    NORMAL: builder.AddFloatAttributeToMesh(mesh, draco.NORMAL, vertices, 3, normal),
+  };
+  packed.forEach(
+    (values, k) => (ids[`_PRT_${k}`] = builder.AddFloatAttributeToMesh(mesh, draco.GENERIC, vertices, 4, values)),
+  );
   const encoder = new draco.ExpertEncoder(mesh);
   encoder.SetSpeedOptions(7, 7);
   for (const [name, id] of Object.entries(ids)) encoder.SetAttributeQuantization(id, name === 'POSITION' ? 16 : 12);
@@ -67,7 +80,13 @@ function glb(json, binary) {
   const [text, data] = [pad(Buffer.from(JSON.stringify(json)), ' '), pad(binary, 0)];
   const head = (length, kind) => Buffer.from(Uint32Array.of(length, kind).buffer);
   const total = 12 + 8 + text.length + 8 + data.length;
-  return Buffer.concat([Buffer.from(Uint32Array.of(0x46546c67, 2, total).buffer), head(text.length, 0x4e4f534a), text, head(data.length, 0x004e4942), data]);
+  return Buffer.concat([
+    Buffer.from(Uint32Array.of(0x46546c67, 2, total).buffer),
+    head(text.length, 0x4e4f534a),
+    text,
+    head(data.length, 0x004e4942),
+    data,
+  ]);
 }
 
 export async function makeLarge(side = 224, order = 6) {
@@ -76,7 +95,9 @@ export async function makeLarge(side = 224, order = 6) {
   const { ids, bytes } = await compress(mesh, packed);
   const names = Object.keys(ids);
   const accessor = (type) => ({ componentType: 5126, count: mesh.vertices, type });
-  const light = Array.from({ length: order * order }, (_, i) => (i === 0 ? [3, 3.2, 3.6] : i === 1 ? [1.2, 1.1, 1] : [0, 0, 0]));
+  const light = Array.from({ length: order * order }, (_, i) =>
+    i === 0 ? [3, 3.2, 3.6] : i === 1 ? [1.2, 1.1, 1] : [0, 0, 0],
+  );
   const json = {
     asset: { version: '2.0', extras: { kiln: { engine: 'make_large.mjs' } } },
     extensionsUsed: ['KHR_draco_mesh_compression', 'KHR_materials_unlit', 'KILN_radiance_transfer'],
@@ -85,16 +106,45 @@ export async function makeLarge(side = 224, order = 6) {
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0, scale: [10, 10, 10] }],
     materials: [{ extensions: { KHR_materials_unlit: {} }, doubleSided: true }],
-    meshes: [{ primitives: [{
-      attributes: Object.fromEntries(names.map((name, i) => [name, i + 1])),
-      indices: 0,
-      material: 0,
-      extensions: { KHR_draco_mesh_compression: { bufferView: 0, attributes: ids }, KILN_radiance_transfer: { albedo: [0.6, 0.55, 0.45], emission: [0, 0, 0], material: 0 } },
-    }] }],
-    accessors: [{ componentType: 5125, count: mesh.indices.length, type: 'SCALAR' }, { ...accessor('VEC3'), min: [-0.5, -0.1, -0.5], max: [0.5, 0.1, 0.5] }, accessor('VEC3'), ...packed.map(() => accessor('VEC4'))],
+    meshes: [
+      {
+        primitives: [
+          {
+            attributes: Object.fromEntries(names.map((name, i) => [name, i + 1])),
+            indices: 0,
+            material: 0,
+            extensions: {
+              KHR_draco_mesh_compression: { bufferView: 0, attributes: ids },
+              KILN_radiance_transfer: { albedo: [0.6, 0.55, 0.45], emission: [0, 0, 0], material: 0 },
+            },
+          },
+        ],
+      },
+    ],
+    accessors: [
+      { componentType: 5125, count: mesh.indices.length, type: 'SCALAR' },
+      { ...accessor('VEC3'), min: [-0.5, -0.1, -0.5], max: [0.5, 0.1, 0.5] },
+      accessor('VEC3'),
+      ...packed.map(() => accessor('VEC4')),
+    ],
     bufferViews: [{ buffer: 0, byteLength: bytes.length }],
     buffers: [{ byteLength: bytes.length + (-bytes.length & 3) }],
-    extensions: { KILN_radiance_transfer: { version: 1, basis: 'real-sh', condonShortley: false, order, channels: 3, fixed: false, slots: order * order, attributes: packed.map((_, k) => `_PRT_${k}`), scale, offset, light: { name: 'sky', coefficients: light }, look: { exposure: 1, toneMap: 'shoulder-0.6' } } },
+    extensions: {
+      KILN_radiance_transfer: {
+        version: 1,
+        basis: 'real-sh',
+        condonShortley: false,
+        order,
+        channels: 3,
+        fixed: false,
+        slots: order * order,
+        attributes: packed.map((_, k) => `_PRT_${k}`),
+        scale,
+        offset,
+        light: { name: 'sky', coefficients: light },
+        look: { exposure: 1, toneMap: 'shoulder-0.6' },
+      },
+    },
   };
   return glb(json, bytes);
 }

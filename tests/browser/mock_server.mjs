@@ -15,7 +15,16 @@ export const kPolicy =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; style-src 'self'; img-src 'self' blob: data:; " +
   "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-const kTypes = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8', '.wasm': 'application/wasm', '.svg': 'image/svg+xml', '.json': 'application/json', '.glb': 'model/gltf-binary', '.png': 'image/png' };
+const kTypes = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.css': 'text/css; charset=utf-8',
+  '.wasm': 'application/wasm',
+  '.svg': 'image/svg+xml',
+  '.json': 'application/json',
+  '.glb': 'model/gltf-binary',
+  '.png': 'image/png',
+};
 
 export const kHostileLabel = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
 
@@ -25,7 +34,13 @@ function makeJob(number, label, status, more = {}) {
   const running = status === 'running';
   const done = status === 'succeeded';
   const id = `01J9Z0000000000000000000${String(number).padStart(2, '0')}`;
-  const file = (name, bytes, media_type) => ({ name, bytes, sha256: 'ab'.repeat(32), media_type, url: `/v1/jobs/${id}/artifacts/${name}` });
+  const file = (name, bytes, media_type) => ({
+    name,
+    bytes,
+    sha256: 'ab'.repeat(32),
+    media_type,
+    url: `/v1/jobs/${id}/artifacts/${name}`,
+  });
   return {
     id,
     label,
@@ -38,7 +53,13 @@ function makeJob(number, label, status, more = {}) {
     recipe: { steps: [{ do: 'prt', order: 4, bounces: 1 }], quality: 'standard', seed: 0 },
     progress: running ? { stage: 'transfer', done: 25, total: 100, fraction: 0.25, eta_s: 12 } : null,
     error: null,
-    artifacts: done ? [file('scene.glb', 102104, 'model/gltf-binary'), file('preview.png', 20000, 'image/png'), file('report.json', 1596, 'application/json')] : [],
+    artifacts: done
+      ? [
+          file('scene.glb', 102104, 'model/gltf-binary'),
+          file('preview.png', 20000, 'image/png'),
+          file('report.json', 1596, 'application/json'),
+        ]
+      : [],
     links: {},
     ...more,
   };
@@ -50,7 +71,14 @@ export const jobId = (name) => makeJob(kJobIds[name], '', 'queued').id;
 function firstJobs() {
   const jobs = [
     makeJob(1, kHostileLabel, 'succeeded', { artifacts: [] }),
-    makeJob(2, 'broken.glb', 'failed', { error: { title: 'Input refused', status: 422, detail: 'index 70001 is not below the vertex count 65536', where: 'broken.glb: /meshes/3/primitives/0/indices element 812' } }),
+    makeJob(2, 'broken.glb', 'failed', {
+      error: {
+        title: 'Input refused',
+        status: 422,
+        detail: 'index 70001 is not below the vertex count 65536',
+        where: 'broken.glb: /meshes/3/primitives/0/indices element 812',
+      },
+    }),
     makeJob(3, 'too large', 'canceled'),
     makeJob(4, 'knot over floor', 'succeeded'),
     makeJob(5, 'dungeon', 'queued'),
@@ -64,11 +92,34 @@ const kOpenApi = {
   info: { title: 'Kiln', version: '0.1.0', description: 'Bakes light.' },
   paths: {
     '/v1/jobs': {
-      get: { summary: 'List jobs', parameters: [{ name: 'status', in: 'query', schema: { enum: ['queued', 'running'] }, description: 'only these' }], responses: { 200: { description: 'A page of jobs', content: { 'application/json': { schema: { $ref: '#/components/schemas/Page' } } } } } },
-      post: { summary: 'Start a job', requestBody: { content: { 'model/gltf-binary': {} } }, responses: { 202: { description: 'Accepted' } } },
+      get: {
+        summary: 'List jobs',
+        parameters: [
+          { name: 'status', in: 'query', schema: { enum: ['queued', 'running'] }, description: 'only these' },
+        ],
+        responses: {
+          200: {
+            description: 'A page of jobs',
+            content: { 'application/json': { schema: { $ref: '#/components/schemas/Page' } } },
+          },
+        },
+      },
+      post: {
+        summary: 'Start a job',
+        requestBody: { content: { 'model/gltf-binary': {} } },
+        responses: { 202: { description: 'Accepted' } },
+      },
     },
   },
-  components: { schemas: { Page: { type: 'object', required: ['jobs'], properties: { jobs: { type: 'array', items: { type: 'object' }, description: 'newest first' } } } } },
+  components: {
+    schemas: {
+      Page: {
+        type: 'object',
+        required: ['jobs'],
+        properties: { jobs: { type: 'array', items: { type: 'object' }, description: 'newest first' } },
+      },
+    },
+  },
 };
 
 /// `files`: bytes of artefacts that replace the fixtures, by name.
@@ -86,12 +137,21 @@ export async function startMock({ port = 0, files = {} } = {}) {
     return job;
   };
 
-  const json = (response, status, value) => response.writeHead(status, { 'Content-Type': status < 400 ? 'application/json' : 'application/problem+json' }).end(JSON.stringify(value));
-  const missing = (response) => json(response, 404, { title: 'Not found', status: 404, detail: 'there is no such thing here' });
+  const json = (response, status, value) =>
+    response
+      .writeHead(status, { 'Content-Type': status < 400 ? 'application/json' : 'application/problem+json' })
+      .end(JSON.stringify(value));
+  const missing = (response) =>
+    json(response, 404, { title: 'Not found', status: 404, detail: 'there is no such thing here' });
   const file = async (response, path) => {
     try {
       const bytes = await readFile(path);
-      response.writeHead(200, { 'Content-Type': kTypes[extname(path)] ?? 'application/octet-stream', 'Content-Length': bytes.length }).end(bytes);
+      response
+        .writeHead(200, {
+          'Content-Type': kTypes[extname(path)] ?? 'application/octet-stream',
+          'Content-Length': bytes.length,
+        })
+        .end(bytes);
     } catch {
       missing(response);
     }
@@ -100,8 +160,15 @@ export async function startMock({ port = 0, files = {} } = {}) {
   const upload = async (request, response, query) => {
     let bytes = 0;
     for await (const chunk of request) bytes += chunk.length;
-    if (bytes < 12) return json(response, 422, { title: 'Input refused', status: 422, detail: 'the file is shorter than a GLB header' });
-    const job = makeJob(10 + jobs.size, query.get('label') ?? 'upload', 'queued', { recipe: { preset: query.get('preset') } });
+    if (bytes < 12)
+      return json(response, 422, {
+        title: 'Input refused',
+        status: 422,
+        detail: 'the file is shorter than a GLB header',
+      });
+    const job = makeJob(10 + jobs.size, query.get('label') ?? 'upload', 'queued', {
+      recipe: { preset: query.get('preset') },
+    });
     jobs.set(job.id, job);
     json(response, 202, job);
     emit('state', job);
@@ -114,12 +181,20 @@ export async function startMock({ port = 0, files = {} } = {}) {
       streams.add(response);
       response.on('close', () => streams.delete(response));
     } else if (url.pathname === '/v1/presets') {
-      json(response, 200, { presets: [{ name: 'prt', description: 'Radiance transfer, order 6, with bounces.', recipe: {} }, { name: 'draft', description: 'The same, quick and rough.', recipe: {} }] });
+      json(response, 200, {
+        presets: [
+          { name: 'prt', description: 'Radiance transfer, order 6, with bounces.', recipe: {} },
+          { name: 'draft', description: 'The same, quick and rough.', recipe: {} },
+        ],
+      });
     } else if (url.pathname === '/v1/jobs' && request.method === 'POST') {
       await upload(request, response, url.searchParams);
     } else if (url.pathname === '/v1/jobs') {
       const status = url.searchParams.get('status');
-      json(response, 200, { jobs: [...jobs.values()].filter((job) => !status || job.status === status).reverse(), next_cursor: null });
+      json(response, 200, {
+        jobs: [...jobs.values()].filter((job) => !status || job.status === status).reverse(),
+        next_cursor: null,
+      });
     } else if (!id || !jobs.has(id)) {
       missing(response);
     } else if (request.method === 'DELETE') {
@@ -128,7 +203,9 @@ export async function startMock({ port = 0, files = {} } = {}) {
     } else if (rest === 'cancel') {
       json(response, 202, change(id, { status: 'canceled', progress: null }));
     } else if (rest === 'artifacts' && files[name]) {
-      response.writeHead(200, { 'Content-Length': files[name].length, 'Content-Disposition': 'attachment' }).end(files[name]);
+      response
+        .writeHead(200, { 'Content-Length': files[name].length, 'Content-Disposition': 'attachment' })
+        .end(files[name]);
     } else if (rest === 'artifacts') {
       await file(response, join(kFixtures, normalize(`/${name}`)));
     } else {
@@ -144,7 +221,14 @@ export async function startMock({ port = 0, files = {} } = {}) {
     response.setHeader('Referrer-Policy', 'no-referrer');
     if (url.pathname.startsWith('/v1/')) return void api(request, response, url);
     if (url.pathname === '/openapi.json') return json(response, 200, kOpenApi);
-    const page = url.pathname === '/' ? 'index.html' : /^\/view\/[^/]+$/.test(url.pathname) ? 'view.html' : url.pathname === '/docs' ? 'docs.html' : url.pathname;
+    const page =
+      url.pathname === '/'
+        ? 'index.html'
+        : /^\/view\/[^/]+$/.test(url.pathname)
+          ? 'view.html'
+          : url.pathname === '/docs'
+            ? 'docs.html'
+            : url.pathname;
     void file(response, join(kDist, normalize(`/${page}`)));
   });
   await new Promise((resolve) => server.listen(port, '127.0.0.1', resolve));

@@ -16,7 +16,9 @@ export async function decodeBaked(file) {
   return {
     json,
     extension,
-    parts: json.meshes[node.mesh].primitives.map((primitive) => decodePrimitive(draco, json, binary, primitive, extension)),
+    parts: json.meshes[node.mesh].primitives.map((primitive) =>
+      decodePrimitive(draco, json, binary, primitive, extension),
+    ),
   };
 }
 
@@ -43,7 +45,15 @@ function decodePrimitive(draco, json, binary, primitive, extension) {
   const own = primitive.extensions.KILN_radiance_transfer;
   const colours = attributes._ALBEDO === undefined ? null : read('_ALBEDO'); // RGBA, replaces the factor
   const albedoAt = (v) => (colours ? [...colours.subarray(4 * v, 4 * v + 3)] : own.albedo);
-  return { vertices, slots, transfer, position: read('POSITION'), normal: read('NORMAL'), albedoAt, emission: own.emission };
+  return {
+    vertices,
+    slots,
+    transfer,
+    position: read('POSITION'),
+    normal: read('NORMAL'),
+    albedoAt,
+    emission: own.emission,
+  };
 }
 
 /// RGB of a white surface at vertex `v`, straight from the definition.

@@ -10,11 +10,15 @@ const here = fileURLToPath(new URL('.', import.meta.url));
 const needsBrowser = !['light.test.mjs', 'types.test.mjs'].includes(file);
 const packages = existsSync(`${here}../../web_viewer/node_modules/vite`);
 const noServer = file === 'server.test.mjs' && !existsSync(process.env.KILND ?? '') ? 'kilnd is not built' : null;
-const missing = noServer ?? (needsBrowser ? whatIsMissing() : packages ? null : 'web_viewer/node_modules is missing: cd web_viewer && npm ci');
+const missing =
+  noServer ??
+  (needsBrowser ? whatIsMissing() : packages ? null : 'web_viewer/node_modules is missing: cd web_viewer && npm ci');
 if (missing) {
   console.log(`SKIPPED: ${missing}`);
   process.exit(77);
 }
 // One file at a time: two browsers on two cores measure each other.
-const { status } = spawnSync(process.execPath, ['--test', '--test-concurrency=1', `${here}${file}`], { stdio: 'inherit' });
+const { status } = spawnSync(process.execPath, ['--test', '--test-concurrency=1', `${here}${file}`], {
+  stdio: 'inherit',
+});
 process.exit(status ?? 1);

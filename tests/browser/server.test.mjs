@@ -24,7 +24,9 @@ before(async () => {
   folder = mkdtempSync(join(tmpdir(), 'kiln-browser-'));
   const port = await freePort();
   url = `http://127.0.0.1:${port}`;
-  server = spawn(process.env.KILND, ['--data', join(folder, 'data'), '--port', String(port), '--quiet'], { stdio: 'ignore' });
+  server = spawn(process.env.KILND, ['--data', join(folder, 'data'), '--port', String(port), '--quiet'], {
+    stdio: 'ignore',
+  });
   for (let i = 0; ; ++i) {
     const answer = await fetch(`${url}/healthz`).catch(() => null);
     if (answer?.ok) break;
@@ -68,15 +70,30 @@ function plates() {
   const text = Buffer.from(JSON.stringify(json).padEnd(Math.ceil(JSON.stringify(json).length / 4) * 4));
   const words = (...values) => Buffer.from(Uint32Array.from(values).buffer);
   const total = 12 + 8 + text.length + 8 + binary.length;
-  return Buffer.concat([words(0x46546c67, 2, total, text.length, 0x4e4f534a), text, words(binary.length, 0x004e4942), binary]);
+  return Buffer.concat([
+    words(0x46546c67, 2, total, text.length, 0x4e4f534a),
+    text,
+    words(binary.length, 0x004e4942),
+    binary,
+  ]);
 }
 
 test('a model uploaded in the gallery is baked, listed live with its preview, and shown relit in the viewer', async () => {
   const gallery = await openPage(browser, url);
-  await until(gallery, () => document.querySelector('.connection').dataset.live === 'true' && document.querySelector('#preset').options.length > 0);
+  await until(
+    gallery,
+    () =>
+      document.querySelector('.connection').dataset.live === 'true' &&
+      document.querySelector('#preset').options.length > 0,
+  );
   await gallery.selectOption('#preset', 'prt-draft');
   await gallery.setInputFiles('#model', { name: 'plates.glb', mimeType: 'model/gltf-binary', buffer: plates() });
-  await until(gallery, () => document.querySelector('.card[data-status="succeeded"] img')?.naturalWidth > 0, null, 120000);
+  await until(
+    gallery,
+    () => document.querySelector('.card[data-status="succeeded"] img')?.naturalWidth > 0,
+    null,
+    120000,
+  );
   assert.deepEqual(gallery.faults, []);
   assert.deepEqual(await gallery.evaluate(() => window.violations), []);
 
@@ -95,7 +112,8 @@ test('a model uploaded in the gallery is baked, listed live with its preview, an
     const lowest = Math.min(...Array.from({ length: position.count }, (_, v) => position.getY(v)));
     const nearest = (radius) => {
       let best = 0;
-      const off = (v) => Math.abs(Math.hypot(position.getX(v), position.getZ(v)) - radius) + 10 * (position.getY(v) - lowest);
+      const off = (v) =>
+        Math.abs(Math.hypot(position.getX(v), position.getZ(v)) - radius) + 10 * (position.getY(v) - lowest);
       for (let v = 1; v < position.count; ++v) if (off(v) < off(best)) best = v;
       return light.getX(best);
     };
@@ -112,7 +130,10 @@ test('the docs page shows every operation of the real interface', async () => {
   const page = await openPage(browser, `${url}/docs`);
   await until(page, () => document.querySelectorAll('.operation').length > 0);
   const { paths } = await (await fetch(`${url}/openapi.json`)).json();
-  const operations = Object.values(paths).reduce((sum, item) => sum + Object.keys(item).filter((key) => key !== 'parameters').length, 0);
+  const operations = Object.values(paths).reduce(
+    (sum, item) => sum + Object.keys(item).filter((key) => key !== 'parameters').length,
+    0,
+  );
   assert.equal(await page.locator('.operation').count(), operations);
   assert.deepEqual(page.faults, []);
 });
@@ -120,6 +141,20 @@ test('the docs page shows every operation of the real interface', async () => {
 test('a file that is no model is refused, or fails with a reason that the card shows', async () => {
   const page = await openPage(browser, url);
   await until(page, () => document.querySelector('#preset').options.length > 0);
-  await page.setInputFiles('#model', { name: 'noise.glb', mimeType: 'model/gltf-binary', buffer: Buffer.from('this is not a model at all, whatever its name says') });
-  await until(page, () => /\w{4}/.test([...document.querySelectorAll('.refused, .card[data-status="failed"] .problem')].map((e) => e.textContent.replace('noise.glb', '')).join('')), null, 60000);
+  await page.setInputFiles('#model', {
+    name: 'noise.glb',
+    mimeType: 'model/gltf-binary',
+    buffer: Buffer.from('this is not a model at all, whatever its name says'),
+  });
+  await until(
+    page,
+    () =>
+      /\w{4}/.test(
+        [...document.querySelectorAll('.refused, .card[data-status="failed"] .problem')]
+          .map((e) => e.textContent.replace('noise.glb', ''))
+          .join(''),
+      ),
+    null,
+    60000,
+  );
 });

@@ -8,7 +8,15 @@ const require = createRequire(`${viewer}package.json`);
 
 export async function bundle(entry, options = {}) {
   const esbuild = createRequire(require.resolve('vite'))('esbuild');
-  const { outputFiles } = await esbuild.build({ entryPoints: [entry], bundle: true, format: 'esm', write: false, target: 'es2022', nodePaths: [`${viewer}node_modules`], ...options });
+  const { outputFiles } = await esbuild.build({
+    entryPoints: [entry],
+    bundle: true,
+    format: 'esm',
+    write: false,
+    target: 'es2022',
+    nodePaths: [`${viewer}node_modules`],
+    ...options,
+  });
   return outputFiles[0].text;
 }
 

@@ -15,10 +15,14 @@ async function serve() {
   const script = await bundle(fileURLToPath(new URL('stock_page/main.ts', import.meta.url)));
   const server = createServer((request, response) => {
     const name = request.url.split('/').pop();
-    if (request.url === '/') response.setHeader('Content-Type', 'text/html').end('<!doctype html><script type="module" src="/main.js"></script>');
+    if (request.url === '/')
+      response
+        .setHeader('Content-Type', 'text/html')
+        .end('<!doctype html><script type="module" src="/main.js"></script>');
     else if (name === 'main.js') response.setHeader('Content-Type', 'text/javascript').end(script);
     else if (name === 'scene.glb') response.end(file);
-    else if (request.url.startsWith('/draco/')) response.end(readFileSync(pathInViewer(`node_modules/three/examples/jsm/libs/draco/gltf/${name}`)));
+    else if (request.url.startsWith('/draco/'))
+      response.end(readFileSync(pathInViewer(`node_modules/three/examples/jsm/libs/draco/gltf/${name}`)));
     else response.writeHead(404).end();
   });
   await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
@@ -40,7 +44,9 @@ test('a stock GLTFLoader reads both scenes, and our reader gives the light that 
     for (const [index, part] of parts.entries()) {
       assert.equal(result.parts[index].values.length, 3 * part.vertices);
       for (let v = 0; v < part.vertices; v += 7) {
-        valueAt(extension, part, v, light).forEach((value, c) => (largest = Math.max(largest, Math.abs(value - result.parts[index].values[3 * v + c]))));
+        valueAt(extension, part, v, light).forEach(
+          (value, c) => (largest = Math.max(largest, Math.abs(value - result.parts[index].values[3 * v + c]))),
+        );
       }
     }
     // The same decoder and numbers; sums of some 20 float32 terms below 4 against double.

@@ -6,6 +6,10 @@ import { test } from 'node:test';
 import { pathInViewer } from './sources.mjs';
 
 test('tsc finds no fault in web_viewer/src', () => {
-  const { status, stdout, stderr } = spawnSync(pathInViewer('node_modules/.bin/tsc'), ['--noEmit', '-p', pathInViewer('tsconfig.json')], { encoding: 'utf8' });
+  const { status, stdout, stderr } = spawnSync(
+    pathInViewer('node_modules/.bin/tsc'),
+    ['--noEmit', '-p', pathInViewer('tsconfig.json')],
+    { encoding: 'utf8' },
+  );
   assert.equal(status, 0, stdout + stderr);
 });

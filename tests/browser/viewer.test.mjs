@@ -36,7 +36,10 @@ async function withViewer(hash, act, options) {
 }
 
 /// The untextured part, and its vertex that faces the camera most squarely.
-const kPart = baked.parts.findIndex((_part, i) => !baked.json.materials[baked.json.meshes[0].primitives[i].material]?.pbrMetallicRoughness?.baseColorTexture);
+const kPart = baked.parts.findIndex(
+  (_part, i) =>
+    !baked.json.materials[baked.json.meshes[0].primitives[i].material]?.pbrMetallicRoughness?.baseColorTexture,
+);
 
 const pickVertex = (page) =>
   page.evaluate((partIndex) => {
@@ -64,8 +67,19 @@ const readPixel = (page, { x, y }) =>
       stage.drawNow();
       const gl = stage.renderer.getContext();
       const pixel = new Uint8Array(4);
-      gl.readPixels(Math.floor(x * gl.drawingBufferWidth), Math.floor(y * gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      return { colour: [...pixel.slice(0, 3)].map((value) => value / 255), exposure: stage.renderer.toneMappingExposure };
+      gl.readPixels(
+        Math.floor(x * gl.drawingBufferWidth),
+        Math.floor(y * gl.drawingBufferHeight),
+        1,
+        1,
+        gl.RGBA,
+        gl.UNSIGNED_BYTE,
+        pixel,
+      );
+      return {
+        colour: [...pixel.slice(0, 3)].map((value) => value / 255),
+        exposure: stage.renderer.toneMappingExposure,
+      };
     },
     [x, y],
   );
@@ -87,14 +101,30 @@ for (const [name, { hash, light, sky, rotation = 0, intensity = 1, lamps = true 
     withViewer(`${hash}&tone=none&ev=-1`, async (page) => {
       await settled(page);
       const { order } = baked.extension;
-      const own = light ?? rotateAboutY(order, projectSky(kSkies.find(({ id }) => id === sky), order), rotation).map((value) => intensity * value);
+      const own =
+        light ??
+        rotateAboutY(
+          order,
+          projectSky(
+            kSkies.find(({ id }) => id === sky),
+            order,
+          ),
+          rotation,
+        ).map((value) => intensity * value);
       const vertex = await pickVertex(page);
       const part = baked.parts[kPart];
       const value = valueAt(baked.extension, part, vertex.v, own, lamps);
       const { colour, exposure } = await readPixel(page, vertex);
-      const expected = value.map((v, c) => encode(clamp(exposure * (part.albedoAt(vertex.v)[c] * Math.max(0, v) + part.emission[c]))));
+      const expected = value.map((v, c) =>
+        encode(clamp(exposure * (part.albedoAt(vertex.v)[c] * Math.max(0, v) + part.emission[c]))),
+      );
       // 8-bit display steps, and the pixel's centre lies up to a pixel beside the vertex on a curved surface.
-      colour.forEach((shown, c) => assert.ok(Math.abs(shown - expected[c]) < 0.02, `${name}: shown ${colour}, expected ${expected} at ${JSON.stringify(vertex)}`));
+      colour.forEach((shown, c) =>
+        assert.ok(
+          Math.abs(shown - expected[c]) < 0.02,
+          `${name}: shown ${colour}, expected ${expected} at ${JSON.stringify(vertex)}`,
+        ),
+      );
       assert.ok(Math.max(...expected) > 0.1, 'too dark to mean anything');
     }));
 }
@@ -151,7 +181,10 @@ test('the address carries the whole view, there and back', () =>
     await page.goto(address);
     await ready(page);
     const [state, poseAgain] = await page.evaluate(() => [window.kilnViewer.state.get(), window.kilnViewer.stage.pose]);
-    assert.deepEqual([state.light, state.ev, state.wire, state.mode, state.slot], ['sunset', 1.5, true, 'coefficient', 5]);
+    assert.deepEqual(
+      [state.light, state.ev, state.wire, state.mode, state.slot],
+      ['sunset', 1.5, true, 'coefficient', 5],
+    );
     pose.forEach((value, i) => assert.ok(Math.abs(value - poseAgain[i]) < 1e-3)); // three decimals travel
     assert.equal(await page.locator('#c-light').inputValue(), 'sunset');
   }));
@@ -210,19 +243,31 @@ test('a dropped .hdr of one colour lights like a constant sky of it', () =>
   withViewer('tone=none&ev=-1', async (page) => {
     const header = Buffer.from('#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n');
     const texels = Buffer.concat(Array.from({ length: 32 }, () => Buffer.from([128, 64, 32, 129]))); // (1, 0.5, 0.25)
-    await page.setInputFiles('#environment-file', { name: 'plain.hdr', mimeType: 'image/vnd.radiance', buffer: Buffer.concat([header, texels]) });
+    await page.setInputFiles('#environment-file', {
+      name: 'plain.hdr',
+      mimeType: 'image/vnd.radiance',
+      buffer: Buffer.concat([header, texels]),
+    });
     await until(page, () => window.kilnViewer.state.get().light === 'file' && !window.kilnViewer.relighting);
     const coefficients = await page.evaluate(() => [...window.kilnViewer.lights.coefficients('file').slice(0, 6)]);
     // sqrt(4 pi) times the colour; three reads RGBE mantissas as value / 255
-    [1, 0.5, 0.25].forEach((value, c) => assert.ok(Math.abs(coefficients[c] / (Math.sqrt(4 * Math.PI) * value) - 1) < 0.01, `${coefficients}`));
+    [1, 0.5, 0.25].forEach((value, c) =>
+      assert.ok(Math.abs(coefficients[c] / (Math.sqrt(4 * Math.PI) * value) - 1) < 0.01, `${coefficients}`),
+    );
     for (const odd of coefficients.slice(3)) assert.ok(Math.abs(odd) < 1e-3);
     assert.equal(await page.locator('#c-light').inputValue(), 'file');
   }));
 
 test('a dropped file that is no environment is refused in words', () =>
   withViewer('', async (page) => {
-    await page.setInputFiles('#environment-file', { name: 'cat.hdr', mimeType: 'image/png', buffer: Buffer.from('nothing of the kind') });
-    await until(page, () => /neither a Radiance .hdr nor an OpenEXR/.test(document.querySelector('.toast')?.textContent ?? ''));
+    await page.setInputFiles('#environment-file', {
+      name: 'cat.hdr',
+      mimeType: 'image/png',
+      buffer: Buffer.from('nothing of the kind'),
+    });
+    await until(page, () =>
+      /neither a Radiance .hdr nor an OpenEXR/.test(document.querySelector('.toast')?.textContent ?? ''),
+    );
   }));
 
 test('statistics show counts, certificate with interval, plan and warnings', () =>
@@ -240,7 +285,10 @@ test('a job that is still baked is followed until it can be shown', async () => 
   const id = jobId('running');
   const page = await openPage(browser, `${mock.url}/view/${id}`);
   await until(page, () => /The job is running/.test(document.querySelector('.overlay').textContent));
-  await until(page, () => performance.getEntriesByType('resource').some((entry) => entry.name.includes('/events')) || true);
+  await until(
+    page,
+    () => performance.getEntriesByType('resource').some((entry) => entry.name.includes('/events')) || true,
+  );
   while (mock.streams.size === 0) await new Promise((resolve) => setTimeout(resolve, 20));
   mock.emit('progress', { stage: 'transfer', done: 1, total: 2, fraction: 0.5, eta_s: 1 });
   await until(page, () => /Baking: transfer, 50 %/.test(document.querySelector('.overlay').textContent));
@@ -250,7 +298,10 @@ test('a job that is still baked is followed until it can be shown', async () => 
 });
 
 test('a failed job and an unknown one say why', async () => {
-  for (const [id, words] of [[jobId('failed'), /element 812: index 70001/], ['none', /there is no such thing here/]]) {
+  for (const [id, words] of [
+    [jobId('failed'), /element 812: index 70001/],
+    ['none', /there is no such thing here/],
+  ]) {
     const page = await openPage(browser, `${mock.url}/view/${id}`);
     await until(page, () => document.querySelector('.overlay .problem') !== null);
     assert.match(await page.locator('.overlay').innerText(), words);
@@ -260,7 +311,13 @@ test('a failed job and an unknown one say why', async () => {
 
 test('after dispose no GPU memory, no worker and no listener is left', () =>
   withViewer('mode=weighted&wire=true&compare=0.5&light=clear', async (page) => {
-    await until(page, () => window.kilnViewer.comparison !== null && window.kilnViewer.heatMap !== null && window.kilnViewer.wireframe !== null);
+    await until(
+      page,
+      () =>
+        window.kilnViewer.comparison !== null &&
+        window.kilnViewer.heatMap !== null &&
+        window.kilnViewer.wireframe !== null,
+    );
     const before = await page.evaluate(() => {
       const { stage } = window.kilnViewer;
       stage.drawNow();

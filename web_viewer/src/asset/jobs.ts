@@ -95,7 +95,8 @@ export function listJobs(query: { status?: string; label?: string; cursor?: stri
 export const getJob = (id: string): Promise<Job> => request('GET', path(id)) as Promise<Job>;
 export const cancelJob = (id: string): Promise<unknown> => request('POST', `${path(id)}/cancel`);
 export const deleteJob = (id: string): Promise<unknown> => request('DELETE', path(id));
-export const getReport = (job: Job): Promise<Report> => request('GET', artifactUrl(job, 'report.json')) as Promise<Report>;
+export const getReport = (job: Job): Promise<Report> =>
+  request('GET', artifactUrl(job, 'report.json')) as Promise<Report>;
 
 export async function listPresets(): Promise<Preset[]> {
   return ((await request('GET', '/v1/presets')) as { presets: Preset[] }).presets;
@@ -107,7 +108,10 @@ export function submit(file: File, preset: string, progress: (fraction: number) 
     const upload = new XMLHttpRequest();
     const query = new URLSearchParams({ preset, label: file.name });
     upload.open('POST', `/v1/jobs?${query}`);
-    upload.setRequestHeader('Content-Type', file.name.toLowerCase().endsWith('.gltf') ? 'model/gltf+json' : 'model/gltf-binary');
+    upload.setRequestHeader(
+      'Content-Type',
+      file.name.toLowerCase().endsWith('.gltf') ? 'model/gltf+json' : 'model/gltf-binary',
+    );
     upload.upload.addEventListener('progress', (e) => e.lengthComputable && progress(e.loaded / e.total));
     upload.addEventListener('error', () => reject(new RequestFailed('the server could not be reached')));
     upload.addEventListener('load', () => {
@@ -146,7 +150,13 @@ export interface Report {
   plan?: { decision: string; value: unknown; reason: string; saves?: unknown }[];
   parameters?: Record<string, unknown>;
   stages?: { name: string; seconds: number; rays?: number }[];
-  result?: { triangles?: number; vertices?: number; bytes?: number; bytes_per_vertex?: number; streams?: { name: string; bytes: number }[] };
+  result?: {
+    triangles?: number;
+    vertices?: number;
+    bytes?: number;
+    bytes_per_vertex?: number;
+    streams?: { name: string; bytes: number }[];
+  };
   warnings?: { code: string; message: string; where?: string }[];
   certificate?: {
     relrmse?: number;

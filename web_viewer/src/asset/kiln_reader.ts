@@ -72,8 +72,7 @@ export function readRadianceTransfer(gltf: LoadedGltf): RadianceTransfer | undef
     if (!mesh.isMesh || !mesh.geometry.hasAttribute(extension.attributes[0].toLowerCase())) return;
     const place = gltf.parser.associations.get(mesh);
     const own = json.meshes?.[place?.meshes ?? -1]?.primitives[place?.primitives ?? 0]?.extensions?.[kName] as
-      | Partial<TransferPart>
-      | undefined;
+      Partial<TransferPart> | undefined;
     parts.push({
       mesh,
       geometry: mesh.geometry,
@@ -89,8 +88,13 @@ function checkShape(e: RadianceTransferExtension): void {
   const slots = e.order * e.order + (e.fixed ? 1 : 0);
   const flat = e.channels * slots;
   const good =
-    Number.isInteger(e.order) && e.order >= 1 && (e.channels === 1 || e.channels === 3) && e.slots === slots &&
-    e.scale?.length >= flat && e.offset?.length >= flat && e.attributes?.length === Math.ceil(flat / 4);
+    Number.isInteger(e.order) &&
+    e.order >= 1 &&
+    (e.channels === 1 || e.channels === 3) &&
+    e.slots === slots &&
+    e.scale?.length >= flat &&
+    e.offset?.length >= flat &&
+    e.attributes?.length === Math.ceil(flat / 4);
   if (e.version !== 1) throw new Error(`${kName} version ${e.version} is newer than this reader`);
   if (!good) throw new Error(`${kName} does not describe its own attributes`);
 }
@@ -107,7 +111,12 @@ export function transferAttributes(e: RadianceTransferExtension, geometry: Buffe
 /// RGB that leaves a white surface at every vertex under SH `light` (light[3 * i + channel], order^2 entries or more).
 /// `lamps`: add the light of the scene's own lamps where it was baked. 50 000 vertices of order 6 in RGB take about 30 ms;
 /// decode once and keep the numbers (as this viewer's worker does) if the light changes often.
-export function lightValues(e: RadianceTransferExtension, geometry: BufferGeometry, light: ArrayLike<number>, lamps = true): Float32Array {
+export function lightValues(
+  e: RadianceTransferExtension,
+  geometry: BufferGeometry,
+  light: ArrayLike<number>,
+  lamps = true,
+): Float32Array {
   const attributes = transferAttributes(e, geometry);
   const vertices = attributes[0].length / 4;
   const out = new Float32Array(3 * vertices);

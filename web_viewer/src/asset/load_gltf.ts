@@ -89,11 +89,12 @@ function forgetCompressed(parser: GLTFParser, json: Json): void {
 
 async function download(url: string, progress: DownloadProgress): Promise<ArrayBuffer> {
   const response = await fetch(url);
-  if (!response.ok || !response.body) throw new Error(`the server answered ${response.status} for ${new URL(response.url).pathname}`);
+  if (!response.ok || !response.body)
+    throw new Error(`the server answered ${response.status} for ${new URL(response.url).pathname}`);
   const total = Number(response.headers.get('Content-Length') ?? 0);
   const chunks: Uint8Array<ArrayBuffer>[] = [];
   let loaded = 0;
-  for (const reader = response.body.getReader(); ; ) {
+  for (const reader = response.body.getReader(); ;) {
     const { done, value } = await reader.read();
     if (done) break;
     chunks.push(value);

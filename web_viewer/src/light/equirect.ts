@@ -36,7 +36,8 @@ export function projectEquirect(map: EquirectMap, order: number): Float32Array {
   const sums = new Float64Array(3 * basis.length);
   const rgb = new Float64Array(3);
   for (let row = 0; row < rows; ++row) {
-    const solidAngle = ((2 * Math.PI) / columns) * (Math.cos((Math.PI * row) / rows) - Math.cos((Math.PI * (row + 1)) / rows));
+    const solidAngle =
+      ((2 * Math.PI) / columns) * (Math.cos((Math.PI * row) / rows) - Math.cos((Math.PI * (row + 1)) / rows));
     for (let column = 0; column < columns; ++column) {
       const { x, y, z } = directionAt((column + 0.5) / columns, (row + 0.5) / rows);
       const texel = map.stride * (Math.floor(row / split) * map.width + Math.floor(column / split));
@@ -49,7 +50,10 @@ export function projectEquirect(map: EquirectMap, order: number): Float32Array {
 }
 
 /// A function on the sphere as a picture of `width` x `width / 2` texels, rows from the top, RGBA.
-export function functionToEquirect(radiance: (x: number, y: number, z: number, rgb: Float64Array) => void, width: number): EquirectMap {
+export function functionToEquirect(
+  radiance: (x: number, y: number, z: number, rgb: Float64Array) => void,
+  width: number,
+): EquirectMap {
   const height = width / 2;
   const data = new Float32Array(4 * width * height);
   const rgb = new Float64Array(3);
@@ -72,12 +76,15 @@ export function lightToEquirect(order: number, light: ArrayLike<number>, width: 
   return functionToEquirect(radiance, width);
 }
 
-/// The light blurred by de la Vallee Poussin's kernel, band l times n!^2 / ((n - l)! (n + l)!) with n = order - 1.
+/// The light blurred by the kernel (1 + cos)^n, n = order - 1: band l times n! (n + 1)! / ((n - l)! (n + l + 1)!).
 /// The kernel is nowhere negative: light that was positive before it was cut to harmonics is so again.
 export function softened(order: number, light: ArrayLike<number>): Float32Array {
   const factors = [1];
-  for (let l = 1; l < order; ++l) factors.push((factors[l - 1] * (order - l)) / (order - 1 + l));
-  return Float32Array.from({ length: 3 * shCount(order) }, (_, i) => light[i] * factors[Math.floor(Math.sqrt(Math.floor(i / 3)))]);
+  for (let l = 1; l < order; ++l) factors.push((factors[l - 1] * (order - l)) / (order + l));
+  return Float32Array.from(
+    { length: 3 * shCount(order) },
+    (_, i) => light[i] * factors[Math.floor(Math.sqrt(Math.floor(i / 3)))],
+  );
 }
 
 /// Halves a map until it is at most `width` wide: each 2 x 2 block becomes its mean, weighted by solid angle.

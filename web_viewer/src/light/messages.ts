@@ -50,7 +50,8 @@ export interface ProjectRequest {
   order: number;
 }
 
-export type Request = LoadRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
+export type Request =
+  LoadRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
 
 export interface ValuesReply {
   values: Float32Array[]; // one per part

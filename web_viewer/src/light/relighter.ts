@@ -11,7 +11,9 @@ export class Relighter {
 
   constructor() {
     this.worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => this.settle(data));
-    this.worker.addEventListener('error', (event) => this.failAll(new Error(event.message || 'the light worker stopped')));
+    this.worker.addEventListener('error', (event) =>
+      this.failAll(new Error(event.message || 'the light worker stopped')),
+    );
   }
 
   /// Gives the transfer vectors away: the arrays of `request` are empty afterwards.

@@ -8,7 +8,14 @@ export const shCount = (order: number): number => order * order;
 
 /// Writes Y_i(x, y, z) for all i of `order` to out[offset + i]. The direction is unit.
 ///   Y(l, +-m) = sqrt(2) P(l, m)(z) { Re | Im } (x + iy)^m,  P normalised and divided by sin^m
-export function evaluateSh(order: number, x: number, y: number, z: number, out: Float32Array | Float64Array, offset = 0): void {
+export function evaluateSh(
+  order: number,
+  x: number,
+  y: number,
+  z: number,
+  out: Float32Array | Float64Array,
+  offset = 0,
+): void {
   let cosine = 1; // Re (x + iy)^m
   let sine = 0; // Im (x + iy)^m
   let sectoral = Math.sqrt(1 / (4 * Math.PI)); // P(m, m)

@@ -74,7 +74,11 @@ export const kSkies: readonly Sky[] = [
     radiance: (x, y, z, rgb) => {
       const height = Math.max(y, 0);
       scaled(rgb, [0.16, 0.24, 0.5], y >= 0 ? 0.6 : 0.15);
-      added(rgb, [1.6, 0.62, 0.28], (y >= 0 ? 1 : 0.25) * Math.exp(-5 * height) * (0.35 + 0.65 * lobe(x, 0, z, [-1, 0, 0.3], 1.5)));
+      added(
+        rgb,
+        [1.6, 0.62, 0.28],
+        (y >= 0 ? 1 : 0.25) * Math.exp(-5 * height) * (0.35 + 0.65 * lobe(x, 0, z, [-1, 0, 0.3], 1.5)),
+      );
     },
     suns: [{ direction: [-0.94, 0.2, 0.28], irradiance: [7, 3.1, 1.2] }],
   },
@@ -102,7 +106,8 @@ export function skyPicture(sky: Sky, width: number): EquirectMap {
   const sharpness = 900; // a glow of about 4 degrees, a few texels wide
   return functionToEquirect((x, y, z, rgb) => {
     sky.radiance(x, y, z, rgb);
-    for (const { direction, irradiance } of sky.suns) added(rgb, irradiance, (sharpness / (2 * Math.PI)) * lobe(x, y, z, direction, sharpness));
+    for (const { direction, irradiance } of sky.suns)
+      added(rgb, irradiance, (sharpness / (2 * Math.PI)) * lobe(x, y, z, direction, sharpness));
   }, width);
 }
 

@@ -25,7 +25,8 @@ export function decodeAttributes(
     const first = 4 * k;
     const width = Math.min(4, stride - first); // the last attribute may be padded
     for (let v = 0; v < vertices; ++v) {
-      for (let i = 0; i < width; ++i) out[v * stride + first + i] = shifts[first + i] + factors[first + i] * stored[4 * v + i];
+      for (let i = 0; i < width; ++i)
+        out[v * stride + first + i] = shifts[first + i] + factors[first + i] * stored[4 * v + i];
     }
   });
   return out;
@@ -74,7 +75,8 @@ export function triangleMeasure(
   const out = new Float32Array(indices.length / 3);
   for (let t = 0; t < out.length; ++t) {
     const [a, b, c] = [indices[3 * t], indices[3 * t + 1], indices[3 * t + 2]];
-    const sum = distance(shape, coefficients, a, b) + distance(shape, coefficients, b, c) + distance(shape, coefficients, c, a);
+    const sum =
+      distance(shape, coefficients, a, b) + distance(shape, coefficients, b, c) + distance(shape, coefficients, c, a);
     out[t] = weighted ? sum * Math.sqrt(triangleArea(positions, a, b, c)) : sum;
   }
   return out;
@@ -101,7 +103,12 @@ function triangleArea(p: Float32Array, a: number, b: number, c: number): number 
 }
 
 /// One slot of one channel at every vertex.
-export function pickCoefficient(shape: TransferShape, coefficients: Float32Array, channel: number, slot: number): Float32Array {
+export function pickCoefficient(
+  shape: TransferShape,
+  coefficients: Float32Array,
+  channel: number,
+  slot: number,
+): Float32Array {
   const stride = shape.channels * shape.slots;
   const out = new Float32Array(coefficients.length / stride);
   const first = (shape.channels === 1 ? 0 : channel) * shape.slots + slot;

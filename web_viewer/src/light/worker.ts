@@ -30,7 +30,9 @@ function load(request: LoadRequest): Float32Array[] {
 function level(light: Float32Array): number {
   const brightest = parts.map((p) => {
     const values = relight(shape, p.coefficients, light, true);
-    return Float32Array.from({ length: values.length / 3 }, (_, v) => Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]));
+    return Float32Array.from({ length: values.length / 3 }, (_, v) =>
+      Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]),
+    );
   });
   return rangeOf(brightest, 0.9);
 }
@@ -70,7 +72,10 @@ function compute(request: Exclude<Request, ProjectRequest>): ValuesReply {
     case 'load':
       return timed(() => load(request), false);
     case 'relight':
-      return timed(() => parts.map((p, i) => relight(shape, p.coefficients, request.light, request.lamps, request.reuse[i])), false);
+      return timed(
+        () => parts.map((p, i) => relight(shape, p.coefficients, request.light, request.lamps, request.reuse[i])),
+        false,
+      );
     case 'level':
       return { values: [], range: level(request.light), milliseconds: 0 };
     case 'measure':

@@ -13,7 +13,12 @@ import {
   type ShaderMaterial,
   type Texture,
 } from 'three';
-import { readRadianceTransfer, transferAttributes, type RadianceTransfer, type TransferPart } from '../asset/kiln_reader';
+import {
+  readRadianceTransfer,
+  transferAttributes,
+  type RadianceTransfer,
+  type TransferPart,
+} from '../asset/kiln_reader';
 import type { LoadedAsset } from '../asset/load_gltf';
 import type { PartData } from '../light/messages';
 import { bakedMaterial } from '../shaders/baked_material';
@@ -75,12 +80,21 @@ export class BakedModel {
   private async dress(part: TransferPart, asset: LoadedAsset): Promise<BakedPart> {
     const geometry = part.geometry;
     const unlit = part.mesh.material as MeshBasicMaterial;
-    const original = part.material < 0 ? undefined : ((await asset.gltf.parser.getDependency('material', part.material)) as MeshStandardMaterial);
+    const original =
+      part.material < 0
+        ? undefined
+        : ((await asset.gltf.parser.getDependency('material', part.material)) as MeshStandardMaterial);
     this.ownedMaterials.add(unlit);
     if (original) this.ownedMaterials.add(original);
     const light = new BufferAttribute(new Float32Array(3 * geometry.getAttribute('position').count), 3);
     geometry.setAttribute('light', light.setUsage(DynamicDrawUsage));
-    const material = bakedMaterial({ unlit, original, albedo: part.albedo, emission: part.emission, vertexAlbedo: geometry.hasAttribute('_albedo') });
+    const material = bakedMaterial({
+      unlit,
+      original,
+      albedo: part.albedo,
+      emission: part.emission,
+      vertexAlbedo: geometry.hasAttribute('_albedo'),
+    });
     part.mesh.material = material;
     return { mesh: part.mesh as BakedPart['mesh'], material, light };
   }

@@ -1,7 +1,17 @@
 // Before and after: left of the divider the original materials under the same light without shadows (three's image-based
 // light, what a viewer shows without a bake), right of it the baked model.
 
-import { Color, DirectionalLight, Group, type Light, type Mesh, type Object3D, type Material, Scene, type Texture } from 'three';
+import {
+  Color,
+  DirectionalLight,
+  Group,
+  type Light,
+  type Mesh,
+  type Object3D,
+  type Material,
+  Scene,
+  type Texture,
+} from 'three';
 import { disposeMaterials } from './baked_model';
 import type { Sun } from '../light/skies';
 import type { Stage } from './stage';

@@ -50,7 +50,10 @@ let openapi: Document;
 /// Follows a local reference (RFC 6901).
 function resolve<T extends { $ref?: string }>(value: T): T {
   if (!value.$ref?.startsWith('#/')) return value;
-  const keys = value.$ref.slice(2).split('/').map((key) => key.replaceAll('~1', '/').replaceAll('~0', '~'));
+  const keys = value.$ref
+    .slice(2)
+    .split('/')
+    .map((key) => key.replaceAll('~1', '/').replaceAll('~0', '~'));
   let found: unknown = openapi;
   for (const key of keys) found = (found as Record<string, unknown> | undefined)?.[key];
   return (found as T | undefined) ?? value;
@@ -72,7 +75,13 @@ function properties(schema: Schema | undefined): HTMLElement | null {
   const whole = schema && resolve(schema);
   if (!whole?.properties) return null;
   const rows = Object.entries(whole.properties).map(([name, one]) =>
-    h('tr', {}, h('th', { scope: 'row' }, h('code', {}, name), whole.required?.includes(name) ? ' *' : ''), h('td', {}, typeName(one)), h('td', {}, resolve(one).description ?? '')),
+    h(
+      'tr',
+      {},
+      h('th', { scope: 'row' }, h('code', {}, name), whole.required?.includes(name) ? ' *' : ''),
+      h('td', {}, typeName(one)),
+      h('td', {}, resolve(one).description ?? ''),
+    ),
   );
   return table(['Field', 'Type', 'Meaning'], rows);
 }
@@ -84,21 +93,46 @@ function table(heads: string[], rows: HTMLElement[]): HTMLElement {
     heads = heads.slice(0, -1);
   }
 
-  return h('div', { class: 'table-scroll', tabindex: 0, role: 'region', 'aria-label': heads.join(', ') }, h('table', {}, h('thead', {}, h('tr', {}, ...heads.map((head) => h('th', { scope: 'col' }, head)))), h('tbody', {}, ...rows)));
+  return h(
+    'div',
+    { class: 'table-scroll', tabindex: 0, role: 'region', 'aria-label': heads.join(', ') },
+    h(
+      'table',
+      {},
+      h('thead', {}, h('tr', {}, ...heads.map((head) => h('th', { scope: 'col' }, head)))),
+      h('tbody', {}, ...rows),
+    ),
+  );
 }
 
 function parameterTable(list: Parameter[]): HTMLElement | null {
   if (list.length === 0) return null;
-  const rows = list.map(resolve).map((p) =>
-    h('tr', {}, h('th', { scope: 'row' }, h('code', {}, p.name), p.required ? ' *' : ''), h('td', {}, p.in), h('td', {}, typeName(p.schema)), h('td', {}, p.description ?? '')),
-  );
+  const rows = list
+    .map(resolve)
+    .map((p) =>
+      h(
+        'tr',
+        {},
+        h('th', { scope: 'row' }, h('code', {}, p.name), p.required ? ' *' : ''),
+        h('td', {}, p.in),
+        h('td', {}, typeName(p.schema)),
+        h('td', {}, p.description ?? ''),
+      ),
+    );
   return table(['Parameter', 'In', 'Type', 'Meaning'], rows);
 }
 
 /// `detailed`: with the fields of each schema.
 function bodies(content: Content | undefined, detailed: boolean): HTMLElement[] {
   return Object.entries(content ?? {}).map(([media, { schema, example }]) =>
-    h('div', { class: 'body' }, h('code', {}, media), schema ? ` ${typeName(schema)}` : '', detailed ? properties(schema) : null, example === undefined ? null : h('pre', { tabindex: 0 }, JSON.stringify(example, null, 2))),
+    h(
+      'div',
+      { class: 'body' },
+      h('code', {}, media),
+      schema ? ` ${typeName(schema)}` : '',
+      detailed ? properties(schema) : null,
+      example === undefined ? null : h('pre', { tabindex: 0 }, JSON.stringify(example, null, 2)),
+    ),
   );
 }
 
@@ -106,13 +140,25 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
   const request = op.requestBody && resolve(op.requestBody);
   const answers = Object.entries(op.responses ?? {}).map(([status, raw]) => {
     const answer = resolve(raw);
-    return h('li', {}, h('strong', {}, status), ` ${answer.description ?? ''}`, ...bodies(answer.content, status.startsWith('2')));
+    return h(
+      'li',
+      {},
+      h('strong', {}, status),
+      ` ${answer.description ?? ''}`,
+      ...bodies(answer.content, status.startsWith('2')),
+    );
   });
   const curl = `curl${method === 'get' ? '' : ` -X ${method.toUpperCase()}`} '${location.origin}${path}'`;
   return h(
     'details',
     { class: 'operation', id: `${method}${path.replaceAll(/[^a-z0-9]+/gi, '-')}` },
-    h('summary', {}, h('span', { class: `method method-${method}` }, method.toUpperCase()), h('code', {}, path), h('span', { class: 'hint' }, op.summary ?? '')),
+    h(
+      'summary',
+      {},
+      h('span', { class: `method method-${method}` }, method.toUpperCase()),
+      h('code', {}, path),
+      h('span', { class: 'hint' }, op.summary ?? ''),
+    ),
     op.description ? h('p', {}, op.description) : null,
     parameterTable([...shared, ...(op.parameters ?? [])]),
     request ? h('h2', {}, 'Body') : null,
@@ -120,15 +166,39 @@ function operation(path: string, method: string, op: Operation, shared: Paramete
     ...bodies(request?.content, true),
     answers.length ? h('h2', {}, 'Answers') : null,
     h('ul', { class: 'answers' }, ...answers),
-    h('p', { class: 'curl' }, h('code', {}, curl), ' ', h('button', { type: 'button', 'aria-label': `Copy the command for ${method} ${path}`, onclick: () => void copyText(curl, 'Command') }, 'Copy')),
+    h(
+      'p',
+      { class: 'curl' },
+      h('code', {}, curl),
+      ' ',
+      h(
+        'button',
+        {
+          type: 'button',
+          'aria-label': `Copy the command for ${method} ${path}`,
+          onclick: () => void copyText(curl, 'Command'),
+        },
+        'Copy',
+      ),
+    ),
   );
 }
 
 function show(main: HTMLElement): void {
   const { info, paths } = openapi;
-  main.append(h('p', { class: 'lead' }, info.description ?? info.summary ?? '', ' ', h('a', { href: '/openapi.json' }, 'openapi.json'), `, version ${info.version}`));
+  main.append(
+    h(
+      'p',
+      { class: 'lead' },
+      info.description ?? info.summary ?? '',
+      ' ',
+      h('a', { href: '/openapi.json' }, 'openapi.json'),
+      `, version ${info.version}`,
+    ),
+  );
   for (const [path, item] of Object.entries(paths)) {
-    for (const method of kMethods) if (item[method]) main.append(operation(path, method, item[method], item.parameters ?? []));
+    for (const method of kMethods)
+      if (item[method]) main.append(operation(path, method, item[method], item.parameters ?? []));
   }
 }
 

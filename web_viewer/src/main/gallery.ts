@@ -12,9 +12,18 @@ applyTheme();
 const cards = new Map<string, JobCard>();
 const grid = h('div', { class: 'grid' });
 const empty = h('p', { class: 'empty' });
-const more = h('button', { type: 'button', class: 'more', hidden: true, onclick: () => void load(cursor) }, 'Show older jobs');
+const more = h(
+  'button',
+  { type: 'button', class: 'more', hidden: true, onclick: () => void load(cursor) },
+  'Show older jobs',
+);
 const connection = h('span', { class: 'connection' }, 'connecting');
-const statusFilter = h('select', { id: 'status' }, h('option', { value: '' }, 'any status'), ...kStatuses.map((s) => h('option', { value: s }, s)));
+const statusFilter = h(
+  'select',
+  { id: 'status' },
+  h('option', { value: '' }, 'any status'),
+  ...kStatuses.map((s) => h('option', { value: s }, s)),
+);
 const labelFilter = h('input', { id: 'label', type: 'search', placeholder: 'part of a label', autocomplete: 'off' });
 let cursor = '';
 
@@ -42,7 +51,10 @@ function drop(id: string): void {
 
 function matches(job: Job): boolean {
   const label = labelFilter.value.trim().toLowerCase();
-  return (!statusFilter.value || job.status === statusFilter.value) && (!label || (job.label || job.id).toLowerCase().includes(label));
+  return (
+    (!statusFilter.value || job.status === statusFilter.value) &&
+    (!label || (job.label || job.id).toLowerCase().includes(label))
+  );
 }
 
 /// Newest first: ids sort by time of creation.
@@ -56,7 +68,9 @@ function show(job: Job): void {
     const made = new JobCard(job, actions);
     cards.set(job.id, made);
     made.element.hidden = !matches(job);
-    const after = [...cards.values()].filter((c) => c.job.id < job.id).sort((a, b) => (a.job.id < b.job.id ? 1 : -1))[0];
+    const after = [...cards.values()]
+      .filter((c) => c.job.id < job.id)
+      .sort((a, b) => (a.job.id < b.job.id ? 1 : -1))[0];
     grid.insertBefore(made.element, after?.element ?? null);
   }
   showEmpty();
@@ -71,7 +85,10 @@ function outdated(job: Job): boolean {
 function showEmpty(): void {
   const visible = [...cards.values()].some((card) => !card.element.hidden);
   empty.hidden = visible;
-  empty.textContent = cards.size === 0 ? 'No jobs yet. Drop a model on this page, or use the curl command.' : 'No job matches the filter.';
+  empty.textContent =
+    cards.size === 0
+      ? 'No jobs yet. Drop a model on this page, or use the curl command.'
+      : 'No job matches the filter.';
 }
 
 async function load(from: string): Promise<void> {
@@ -112,7 +129,14 @@ function build(): void {
     labelFilter,
     connection,
   );
-  const jobs = h('section', { class: 'jobs', 'aria-labelledby': 'jobs-title' }, h('div', { class: 'jobs-head' }, h('h2', { id: 'jobs-title' }, 'Jobs'), filters), grid, empty, more);
+  const jobs = h(
+    'section',
+    { class: 'jobs', 'aria-labelledby': 'jobs-title' },
+    h('div', { class: 'jobs-head' }, h('h2', { id: 'jobs-title' }, 'Jobs'), filters),
+    grid,
+    empty,
+    more,
+  );
   const docs = h('a', { href: '/docs', class: 'text-link' }, 'HTTP interface');
   document.body.append(pageHeader('Baked light', docs), h('main', {}, new UploadPanel(show).element, jobs));
 }

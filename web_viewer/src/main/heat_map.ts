@@ -19,7 +19,10 @@ export class HeatMap {
   constructor(model: BakedModel, data: HeatMapData) {
     this.material = falseColourMaterial(data.map, data.range);
     model.parts.forEach(({ mesh }, i) => {
-      const own = data.per === 'triangle' ? splitTriangles(mesh.geometry, data.values[i]) : withMeasure(mesh.geometry, data.values[i]);
+      const own =
+        data.per === 'triangle'
+          ? splitTriangles(mesh.geometry, data.values[i])
+          : withMeasure(mesh.geometry, data.values[i]);
       this.dress(mesh, own);
     });
   }

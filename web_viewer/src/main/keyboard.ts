@@ -14,7 +14,12 @@ export interface KeyActions {
 }
 
 /// Returns what ends it.
-export function listenToKeys(stage: Stage, state: Store<ViewState>, canCompare: boolean, actions: KeyActions): () => void {
+export function listenToKeys(
+  stage: Stage,
+  state: Store<ViewState>,
+  canCompare: boolean,
+  actions: KeyActions,
+): () => void {
   const listener = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.metaKey || event.altKey || ownsKeys(event.target)) return;
     if (press(event)) event.preventDefault();
@@ -29,7 +34,8 @@ export function listenToKeys(stage: Stage, state: Store<ViewState>, canCompare: 
     else if (key === 'b') state.set({ background: now.background === 'off' ? 'sky' : 'off' });
     else if (key === 'c' && canCompare) state.set({ compare: now.compare === null ? 0.5 : null });
     else if (key === '[' || key === ']') state.set({ rotation: turned(now.rotation, key === ']' ? 5 : -5) });
-    else if (key === '+' || key === '=' || key === '-') state.set({ ev: Math.min(6, Math.max(-6, now.ev + (key === '-' ? -0.5 : 0.5))) });
+    else if (key === '+' || key === '=' || key === '-')
+      state.set({ ev: Math.min(6, Math.max(-6, now.ev + (key === '-' ? -0.5 : 0.5))) });
     else return false;
     return true;
   };
@@ -58,7 +64,10 @@ export function resetView(stage: Stage, state: Store<ViewState>): void {
 }
 
 function ownsKeys(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.closest('input:not([type=checkbox]), select, textarea, dialog[open], [role=slider]') !== null;
+  return (
+    target instanceof HTMLElement &&
+    target.closest('input:not([type=checkbox]), select, textarea, dialog[open], [role=slider]') !== null
+  );
 }
 
 function moveCamera(stage: Stage, event: KeyboardEvent): boolean {

@@ -27,7 +27,10 @@ export class Lights {
     private readonly bakedName: string,
   ) {
     this.known.set('baked', withOrder(baked, order));
-    this.choices.push({ id: 'baked', label: baked.length > 0 ? `As baked: ${bakedName || 'environment'}` : 'As baked: no sky, lamps only' });
+    this.choices.push({
+      id: 'baked',
+      label: baked.length > 0 ? `As baked: ${bakedName || 'environment'}` : 'As baked: no sky, lamps only',
+    });
     this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
   }
 
@@ -36,7 +39,10 @@ export class Lights {
     this.levels.delete('file');
     this.map = map;
     const place = this.choices.findIndex(({ id }) => id === 'file');
-    this.choices.splice(place < 0 ? this.choices.length : place, place < 0 ? 0 : 1, { id: 'file', label: `Dropped: ${name}` });
+    this.choices.splice(place < 0 ? this.choices.length : place, place < 0 ? 0 : 1, {
+      id: 'file',
+      label: `Dropped: ${name}`,
+    });
   }
 
   coefficients(id: string): Float32Array {
@@ -57,10 +63,10 @@ export class Lights {
   }
 
   /// What three's image-based light gets: no suns (its filter loses small bright spots; they come as lamps) and no detail.
-  reflection(id: string): { picture: EquirectMap; suns: readonly Sun[] } {
+  reflection(id: string): { picture: () => EquirectMap; suns: readonly Sun[] } {
     const sky = this.skyOf(id);
-    if (sky) return { picture: functionToEquirect(sky.radiance, kSkyWidth), suns: sky.suns };
-    return { picture: lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth), suns: [] };
+    if (sky) return { picture: () => functionToEquirect(sky.radiance, kSkyWidth), suns: sky.suns };
+    return { picture: () => lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth), suns: [] };
   }
 
   /// A picture of the light: its harmonics as they are, or the sky itself. Where only harmonics are known they are softened.
@@ -68,14 +74,18 @@ export class Lights {
     if (harmonics) return lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth);
     if (id === 'file' && this.map) return this.map;
     const sky = this.skyOf(id);
-    return sky ? skyPicture(sky, kSkyWidth) : lightToEquirect(this.order, softened(this.order, this.coefficients(id)), kHarmonicsWidth);
+    return sky
+      ? skyPicture(sky, kSkyWidth)
+      : lightToEquirect(this.order, softened(this.order, this.coefficients(id)), kHarmonicsWidth);
   }
 
   /// The formula behind a light. A bake says only the name of its sky; it is believed when the coefficients agree.
   private skyOf(id: string): Sky | undefined {
     if (id !== 'baked') return kSkies.find((one) => one.id === id);
     const named = kSkies.find((one) => one.id === this.bakedName);
-    return named && relativeDistance(this.coefficients(named.id), this.coefficients('baked')) < kSameSky ? named : undefined;
+    return named && relativeDistance(this.coefficients(named.id), this.coefficients('baked')) < kSameSky
+      ? named
+      : undefined;
   }
 }
 

@@ -13,7 +13,8 @@ export class Store<T extends object> {
 
   set(change: Partial<T>): void {
     const changed = new Set<keyof T>();
-    for (const key of Object.keys(change) as (keyof T)[]) if (!Object.is(change[key], this.state[key])) changed.add(key);
+    for (const key of Object.keys(change) as (keyof T)[])
+      if (!Object.is(change[key], this.state[key])) changed.add(key);
     if (changed.size === 0) return;
     this.state = { ...this.state, ...change };
     for (const listener of [...this.listeners]) listener(this.state, changed);

@@ -47,7 +47,10 @@ export function encodeState(state: ViewState): string {
     const value = state[key];
     if (value === kDefaultState[key] || value === null) continue;
     if (key === 'light' && value === 'file') continue; // a dropped file cannot travel in an address
-    out.set(key, Array.isArray(value) ? value.map(short).join(',') : typeof value === 'number' ? short(value) : String(value));
+    out.set(
+      key,
+      Array.isArray(value) ? value.map(short).join(',') : typeof value === 'number' ? short(value) : String(value),
+    );
   }
   return out.toString().replaceAll('%2C', ',');
 }
@@ -61,7 +64,8 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
   };
   const one = <T extends string>(key: keyof ViewState, allowed: readonly T[]): T =>
     allowed.includes(from.get(key) as T) ? (from.get(key) as T) : (kDefaultState[key] as T);
-  const flag = (key: keyof ViewState): boolean => (from.has(key) ? from.get(key) === 'true' : (kDefaultState[key] as boolean));
+  const flag = (key: keyof ViewState): boolean =>
+    from.has(key) ? from.get(key) === 'true' : (kDefaultState[key] as boolean);
   const pose = (from.get('pose') ?? '').split(',').map(Number);
   return {
     light: one('light', lights),

@@ -3,12 +3,11 @@
 import type { LoadedAsset } from '../asset/load_gltf';
 import type { Relighter } from '../light/relighter';
 import { SkyBackground } from '../shaders/sky_background';
-import { skyTexture } from '../shaders/sky_texture';
-import type { Texture } from 'three';
 import { BakedModel } from './baked_model';
 import { Comparison } from './comparison';
 import { HeatMap, type HeatMapData } from './heat_map';
 import { Lights } from './lights';
+import { SkyPictures } from './sky_pictures';
 import { kDefaultPose, type Stage } from './stage';
 import { Store } from './store';
 import type { ViewState } from './view_state';
@@ -31,7 +30,7 @@ export class Viewer {
   private heatMap: HeatMap | null = null;
   private comparison: Comparison | null = null;
   private comparisonAsked = false;
-  private pictures: { key: string; background: Texture; reflection: Texture | null } | null = null;
+  private readonly pictures: SkyPictures;
   private spare: Float32Array[] = [];
   private relighting = false;
   private relightAgain = false;
@@ -47,6 +46,7 @@ export class Viewer {
   ) {
     const { transfer } = model;
     this.lights = new Lights(transfer.order, transfer.bakedLight, transfer.light?.name ?? '');
+    this.pictures = new SkyPictures(this.lights);
     stage.scene.add(model.root, this.background.mesh);
     stage.setBounds(model.bounds);
     this.setPose();
@@ -105,7 +105,8 @@ export class Viewer {
     const { light } = this.state.get();
     try {
       for (const id of light === 'baked' ? [] : ['baked', light]) {
-        if (!this.lights.levels.has(id)) this.lights.levels.set(id, await this.relighter.level(this.lights.coefficients(id)));
+        if (!this.lights.levels.has(id))
+          this.lights.levels.set(id, await this.relighter.level(this.lights.coefficients(id)));
       }
       this.setLook();
     } catch (error) {
@@ -146,7 +147,10 @@ export class Viewer {
 
   private async heatData(mode: ViewState['mode'], channel: number, slot: number): Promise<HeatMapData> {
     if (mode === 'coefficient') {
-      const { values, range } = await this.relighter.coefficient(channel, Math.min(slot, this.model.transfer.slots - 1));
+      const { values, range } = await this.relighter.coefficient(
+        channel,
+        Math.min(slot, this.model.transfer.slots - 1),
+      );
       return { per: 'vertex', values, map: 'diverging', range: [-range, range] };
     }
     const { values, range } = await this.relighter.measure(mode === 'weighted');
@@ -187,36 +191,17 @@ export class Viewer {
 
   private showSky(): void {
     const { light, background, rotation, intensity, lamps } = this.state.get();
-    const pictures = background === 'off' && !this.comparison ? null : this.picturesOf(light, background === 'harmonics');
-    const shown = background === 'off' ? null : (pictures?.background ?? null);
+    const shown = background === 'off' ? null : this.pictures.background(light, background === 'harmonics');
     this.background.show(shown, rotation, intensity);
-    if (this.comparison && pictures) {
-      const { picture, suns } = this.lights.reflection(light);
-      pictures.reflection ??= skyTexture(picture, true);
-      this.comparison.setLight({ reflection: pictures.reflection, suns, background: shown, rotation, intensity, lamps });
-    }
-  }
-
-  private picturesOf(light: string, harmonics: boolean): { background: Texture; reflection: Texture | null } {
-    const key = `${light} ${harmonics}`;
-    if (this.pictures?.key !== key) {
-      this.dropPictures();
-      this.pictures = { key, background: skyTexture(this.lights.picture(light, harmonics), false), reflection: null };
-    }
-    return this.pictures!;
-  }
-
-  private dropPictures(): void {
-    this.pictures?.background.dispose();
-    this.pictures?.reflection?.dispose();
-    this.pictures = null;
+    if (this.comparison)
+      this.comparison.setLight({ ...this.pictures.reflection(light), background: shown, rotation, intensity, lamps });
   }
 
   /// Reads a .hdr or .exr and makes it the light.
   async useFile(file: File): Promise<void> {
     const { light, map } = await this.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
     this.lights.addFile(file.name, light, map);
-    this.dropPictures();
+    this.pictures.dispose();
     this.onLights();
     if (this.state.get().light === 'file') this.apply(new Set<keyof ViewState>(['light']));
     else this.state.set({ light: 'file' });
@@ -234,7 +219,7 @@ export class Viewer {
     this.heatMap?.dispose();
     this.wireframe?.dispose();
     this.background.dispose();
-    this.dropPictures();
+    this.pictures.dispose();
     this.model.dispose();
     this.asset.dispose();
   }

@@ -4,7 +4,12 @@ import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments } from
 import type { BakedModel } from './baked_model';
 
 export class Wireframe {
-  private readonly material = new LineBasicMaterial({ color: 0x0a0a0a, transparent: true, opacity: 0.55, toneMapped: false });
+  private readonly material = new LineBasicMaterial({
+    color: 0x0a0a0a,
+    transparent: true,
+    opacity: 0.55,
+    toneMapped: false,
+  });
   private readonly lines: LineSegments[];
 
   constructor(model: BakedModel) {

@@ -3,7 +3,15 @@
 // `value` (attribute `light`, linear RGB) was computed by the light worker; nothing here depends on the number of coefficients.
 // Exposure and tone mapping are three's (renderer.toneMapping): the same for baked and original materials.
 
-import { Color, type Material, Matrix3, type MeshBasicMaterial, type MeshStandardMaterial, ShaderMaterial, type Texture } from 'three';
+import {
+  Color,
+  type Material,
+  Matrix3,
+  type MeshBasicMaterial,
+  type MeshStandardMaterial,
+  ShaderMaterial,
+  type Texture,
+} from 'three';
 
 const vertexShader = /* glsl */ `
 attribute vec3 light;

@@ -5,7 +5,18 @@ import { ClampToEdgeWrapping, DataTexture, LinearFilter, RGBAFormat, SRGBColorSp
 export type ColourMapName = 'viridis' | 'diverging';
 
 const kStops: Record<ColourMapName, readonly string[]> = {
-  viridis: ['#440154', '#482878', '#3e4989', '#31688e', '#26828e', '#1f9e89', '#35b779', '#6ece58', '#b5de2b', '#fde725'],
+  viridis: [
+    '#440154',
+    '#482878',
+    '#3e4989',
+    '#31688e',
+    '#26828e',
+    '#1f9e89',
+    '#35b779',
+    '#6ece58',
+    '#b5de2b',
+    '#fde725',
+  ],
   diverging: ['#053061', '#2166ac', '#67a9cf', '#d1e5f0', '#f7f7f7', '#fddbc7', '#ef8a62', '#b2182b', '#67001f'],
 };
 

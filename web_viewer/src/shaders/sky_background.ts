@@ -1,7 +1,15 @@
 // The light itself behind the model: a picture of the sphere on a triangle that covers the screen.
 //   u = 0.5 + atan2(z, x) / (2 pi),   v from the top = 0.5 - asin(y) / pi
 
-import { BufferGeometry, Float32BufferAttribute, Matrix4, Mesh, type PerspectiveCamera, ShaderMaterial, type Texture } from 'three';
+import {
+  BufferGeometry,
+  Float32BufferAttribute,
+  Matrix4,
+  Mesh,
+  type PerspectiveCamera,
+  ShaderMaterial,
+  type Texture,
+} from 'three';
 
 const vertexShader = /* glsl */ `
 uniform mat4 viewToWorld;

@@ -26,7 +26,8 @@ export function skyTexture(map: EquirectMap, forReflection: boolean): DataTextur
     for (let column = 0; column < map.width; ++column) {
       const from = map.stride * (source * map.width + column);
       const to = 4 * (row * map.width + column);
-      for (let c = 0; c < 3; ++c) data[to + c] = DataUtils.toHalfFloat(Math.min(Math.max(map.data[from + c], least), kLargestHalf));
+      for (let c = 0; c < 3; ++c)
+        data[to + c] = DataUtils.toHalfFloat(Math.min(Math.max(map.data[from + c], least), kLargestHalf));
       data[to + 3] = DataUtils.toHalfFloat(1);
     }
   }

@@ -12,7 +12,11 @@ export class Controls {
 
   constructor(private readonly state: Store<ViewState>) {}
 
-  slider(key: Keys<number>, label: string, range: { min: number; max: number; step: number; show(value: number): string }): HTMLElement {
+  slider(
+    key: Keys<number>,
+    label: string,
+    range: { min: number; max: number; step: number; show(value: number): string },
+  ): HTMLElement {
     const output = h('output', { for: `c-${key}` });
     const input = h('input', { type: 'range', id: `c-${key}`, min: range.min, max: range.max, step: range.step });
     input.addEventListener('input', () => this.state.set({ [key]: Number(input.value) }));
@@ -32,7 +36,11 @@ export class Controls {
   }
 
   /// `refill` may be called when the choices have changed.
-  select(key: Keys<string>, label: string, choices: () => { id: string; label: string }[]): { element: HTMLElement; refill(): void } {
+  select(
+    key: Keys<string>,
+    label: string,
+    choices: () => { id: string; label: string }[],
+  ): { element: HTMLElement; refill(): void } {
     const input = h('select', { id: `c-${key}` });
     const refill = () => {
       replaceChildren(input, ...choices().map((choice) => h('option', { value: choice.id }, choice.label)));

@@ -7,7 +7,15 @@ import { h } from './dom';
 export class Divider {
   private readonly line = h(
     'div',
-    { class: 'divider', role: 'slider', tabindex: 0, 'aria-label': 'Divider between before and after', 'aria-valuemin': 0, 'aria-valuemax': 100, hidden: true },
+    {
+      class: 'divider',
+      role: 'slider',
+      tabindex: 0,
+      'aria-label': 'Divider between before and after',
+      'aria-valuemin': 0,
+      'aria-valuemax': 100,
+      hidden: true,
+    },
     h('span', { class: 'divider-knob', 'aria-hidden': 'true' }, '⇔'),
   );
   private readonly before = h('span', { class: 'side-label side-before', hidden: true }, 'Before: unshadowed light');

@@ -5,7 +5,11 @@ type Attributes = Record<string, unknown>;
 
 /// h('button', { type: 'button', onclick: f, class: 'x', 'aria-label': 'y' }, 'text'). A function value whose name starts with
 /// "on" is a listener; true and false set or omit an attribute.
-export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  attributes: Attributes = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) setAttribute(element, name, value);
   append(element, children);
@@ -14,7 +18,8 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Att
 
 function setAttribute(element: HTMLElement, name: string, value: unknown): void {
   if (value === undefined || value === null || value === false) return;
-  if (name.startsWith('on') && typeof value === 'function') element.addEventListener(name.slice(2), value as EventListener);
+  if (name.startsWith('on') && typeof value === 'function')
+    element.addEventListener(name.slice(2), value as EventListener);
   else if (name === 'style') throw new Error('inline style attributes are forbidden by our Content-Security-Policy');
   else element.setAttribute(name, value === true ? '' : String(value));
 }
@@ -31,7 +36,10 @@ export function replaceChildren(element: Element, ...children: Child[]): void {
 /// The text of a live region; screen readers speak it. The same text twice is spoken once.
 export function announce(text: string): void {
   let region = document.getElementById('live');
-  if (!region) document.body.append((region = h('div', { id: 'live', class: 'visually-hidden', role: 'status', 'aria-live': 'polite' })));
+  if (!region)
+    document.body.append(
+      (region = h('div', { id: 'live', class: 'visually-hidden', role: 'status', 'aria-live': 'polite' })),
+    );
   if (region.textContent !== text) region.textContent = text;
 }
 

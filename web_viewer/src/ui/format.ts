@@ -8,17 +8,22 @@ export function bytes(value: number | undefined): string {
   return `${unit === 0 ? value : value.toPrecision(3)} ${units[unit]}`;
 }
 
-export const count = (value: number | undefined): string => (value === undefined ? '–' : Math.round(value).toLocaleString('en'));
+export const count = (value: number | undefined): string =>
+  value === undefined ? '–' : Math.round(value).toLocaleString('en');
 
 export const percent = (fraction: number | undefined): string =>
-  fraction === undefined || !Number.isFinite(fraction) ? '–' : `${(100 * fraction).toPrecision(fraction < 0.1 ? 2 : 3)} %`;
+  fraction === undefined || !Number.isFinite(fraction)
+    ? '–'
+    : `${(100 * fraction).toPrecision(fraction < 0.1 ? 2 : 3)} %`;
 
 export function seconds(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return '–';
   if (value < 1) return `${Math.round(1000 * value)} ms`;
   if (value < 60) return `${value.toPrecision(2)} s`;
   const minutes = Math.floor(value / 60);
-  return minutes < 60 ? `${minutes} min ${Math.round(value % 60)} s` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+  return minutes < 60
+    ? `${minutes} min ${Math.round(value % 60)} s`
+    : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
 export function ago(time: string | null, now = Date.now()): string {

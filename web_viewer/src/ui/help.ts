@@ -22,7 +22,13 @@ const kHelp: readonly [string, string][] = [
 export function helpDialog(): HTMLDialogElement {
   const close = h('button', { type: 'button', class: 'primary' }, 'Close');
   const rows = kHelp.flatMap(([keys, does]) => [h('dt', {}, keys), h('dd', {}, does)]);
-  const dialog = h('dialog', { class: 'help', 'aria-labelledby': 'help-title' }, h('h2', { id: 'help-title' }, 'Keys and gestures'), h('dl', { class: 'pairs keys' }, ...rows), close);
+  const dialog = h(
+    'dialog',
+    { class: 'help', 'aria-labelledby': 'help-title' },
+    h('h2', { id: 'help-title' }, 'Keys and gestures'),
+    h('dl', { class: 'pairs keys' }, ...rows),
+    close,
+  );
   close.addEventListener('click', () => dialog.close());
   dialog.addEventListener('click', (event) => event.target === dialog && dialog.close());
   return dialog;

@@ -76,9 +76,15 @@ export class JobCard {
   }
 
   private factsText(job: Job): string {
-    const took = job.started_at && job.finished_at ? (Date.parse(job.finished_at) - Date.parse(job.started_at)) / 1000 : null;
+    const took =
+      job.started_at && job.finished_at ? (Date.parse(job.finished_at) - Date.parse(job.started_at)) / 1000 : null;
     const result = artifact(job, 'scene.glb');
-    return [ago(job.created_at), took === null ? '' : `took ${seconds(took)}`, result ? bytes(result.bytes) : '', job.attempt > 1 ? `attempt ${job.attempt}` : '']
+    return [
+      ago(job.created_at),
+      took === null ? '' : `took ${seconds(took)}`,
+      result ? bytes(result.bytes) : '',
+      job.attempt > 1 ? `attempt ${job.attempt}` : '',
+    ]
       .filter(Boolean)
       .join(' · ');
   }
@@ -90,7 +96,11 @@ export class JobCard {
     const url = artifact(job, 'preview.png') ? artifactUrl(job, 'preview.png') : null;
     const image = url
       ? h('img', { src: url, alt: `Preview of ${name}`, loading: 'lazy', decoding: 'async' })
-      : h('span', { class: 'thumb-empty' }, finished(job) ? 'No picture' : job.status === 'running' ? 'Baking' : 'Waiting');
+      : h(
+          'span',
+          { class: 'thumb-empty' },
+          finished(job) ? 'No picture' : job.status === 'running' ? 'Baking' : 'Waiting',
+        );
     replaceChildren(this.picture, image);
     const viewable = job.status === 'succeeded';
     if (viewable) this.picture.href = `/view/${encodeURIComponent(job.id)}`;
@@ -98,9 +108,13 @@ export class JobCard {
   }
 
   private showDetails(job: Job): void {
-    const rows: [string, unknown][] = [['id', job.id], ...Object.entries(job.recipe ?? {}).filter(([key]) => key !== 'label')];
+    const rows: [string, unknown][] = [
+      ['id', job.id],
+      ...Object.entries(job.recipe ?? {}).filter(([key]) => key !== 'label'),
+    ];
     replaceChildren(this.recipe, ...rows.flatMap(([key, value]) => [h('dt', {}, key), h('dd', {}, plain(value))]));
-    const link = (name: string, size: number) => h('a', { href: `${artifactUrl(job, name)}?download=1`, download: name }, `${name}, ${bytes(size)}`);
+    const link = (name: string, size: number) =>
+      h('a', { href: `${artifactUrl(job, name)}?download=1`, download: name }, `${name}, ${bytes(size)}`);
     replaceChildren(this.files, ...(job.artifacts ?? []).map((file) => h('li', {}, link(file.name, file.bytes))));
   }
 
@@ -110,12 +124,19 @@ export class JobCard {
       h('button', { type: 'button', class: kind, 'aria-label': `${text}: ${name}`, onclick: action }, text);
     replaceChildren(
       this.buttons,
-      job.status === 'succeeded' ? h('a', { class: 'button primary', href: `/view/${encodeURIComponent(job.id)}` , 'aria-label': `View: ${name}` }, 'View') : null,
+      job.status === 'succeeded'
+        ? h(
+            'a',
+            { class: 'button primary', href: `/view/${encodeURIComponent(job.id)}`, 'aria-label': `View: ${name}` },
+            'View',
+          )
+        : null,
       job.status === 'succeeded' ? button('Copy curl', () => void copyText(this.curl(), 'Command')) : null,
       finished(job) ? null : button('Cancel', () => this.actions.cancel(this.job)),
       finished(job) ? button('Delete', () => this.actions.remove(this.job), 'quiet') : null,
     );
-    for (const child of this.buttons.children) if (focused && child.textContent === focused) (child as HTMLElement).focus();
+    for (const child of this.buttons.children)
+      if (focused && child.textContent === focused) (child as HTMLElement).focus();
   }
 
   private curl(): string {

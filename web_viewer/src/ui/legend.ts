@@ -9,7 +9,13 @@ export class LegendBox {
   private readonly title = h('span', {});
   private readonly low = h('span', {});
   private readonly high = h('span', {});
-  readonly element = h('div', { class: 'legend', hidden: true }, this.title, this.canvas, h('div', { class: 'legend-ends' }, this.low, this.high));
+  readonly element = h(
+    'div',
+    { class: 'legend', hidden: true },
+    this.title,
+    this.canvas,
+    h('div', { class: 'legend-ends' }, this.low, this.high),
+  );
 
   show(legend: Legend, title: string): void {
     this.element.hidden = legend === null;

@@ -10,11 +10,14 @@ type Row = readonly [string, string];
 export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   const box = h('div', { class: 'statistics' }, pairs(sizes(viewer)));
   if (!report) return box;
-  if (report.certificate?.relrmse !== undefined) box.append(h('h3', {}, 'Certificate'), certificate(report.certificate));
-  if (report.warnings?.length) box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
+  if (report.certificate?.relrmse !== undefined)
+    box.append(h('h3', {}, 'Certificate'), certificate(report.certificate));
+  if (report.warnings?.length)
+    box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
   if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
   if (report.stages?.length) box.append(h('h3', {}, 'Time'), pairs(stages(report)));
-  if (report.result?.streams?.length) box.append(h('h3', {}, 'Bytes'), pairs(report.result.streams.map((s): Row => [s.name, bytes(s.bytes)])));
+  if (report.result?.streams?.length)
+    box.append(h('h3', {}, 'Bytes'), pairs(report.result.streams.map((s): Row => [s.name, bytes(s.bytes)])));
   return box;
 }
 
@@ -40,22 +43,37 @@ function certificate(c: NonNullable<Report['certificate']>): HTMLElement {
     ['Measured at', `${count(c.points)} points, ${count(c.samples)} paths each`],
     ...(c.lightings ?? []).map((l): Row => [`under ${l.name}`, percent(l.relrmse)]),
   ];
-  return h('div', {}, h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval}`), pairs(rows));
+  return h(
+    'div',
+    {},
+    h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval}`),
+    pairs(rows),
+  );
 }
 
 function warnings(list: NonNullable<Report['warnings']>): HTMLElement {
-  const item = (w: (typeof list)[number]) => h('li', {}, h('code', {}, w.code), ` ${w.message}`, w.where ? h('span', { class: 'hint' }, ` ${w.where}`) : null);
+  const item = (w: (typeof list)[number]) =>
+    h('li', {}, h('code', {}, w.code), ` ${w.message}`, w.where ? h('span', { class: 'hint' }, ` ${w.where}`) : null);
   return h('ul', { class: 'warnings' }, ...list.map(item));
 }
 
 function plan(list: NonNullable<Report['plan']>): HTMLElement {
   const item = (d: (typeof list)[number]) =>
-    h('li', {}, h('strong', {}, `${d.decision}: ${plain(d.value)}`), ` ${d.reason}`, d.saves ? h('span', { class: 'hint' }, ` Saves ${plain(d.saves)}.`) : null);
+    h(
+      'li',
+      {},
+      h('strong', {}, `${d.decision}: ${plain(d.value)}`),
+      ` ${d.reason}`,
+      d.saves ? h('span', { class: 'hint' }, ` Saves ${plain(d.saves)}.`) : null,
+    );
   return h('ul', { class: 'plan' }, ...list.map(item));
 }
 
 function stages(report: Report): Row[] {
-  const rows = (report.stages ?? []).map((s): Row => [s.name, s.rays ? `${seconds(s.seconds)}, ${count(s.rays)} rays` : seconds(s.seconds)]);
+  const rows = (report.stages ?? []).map((s): Row => [
+    s.name,
+    s.rays ? `${seconds(s.seconds)}, ${count(s.rays)} rays` : seconds(s.seconds),
+  ]);
   if (report.seconds !== undefined) rows.push(['all', seconds(report.seconds)]);
   if (report.peak_memory_bytes) rows.push(['peak memory', bytes(report.peak_memory_bytes)]);
   return rows;

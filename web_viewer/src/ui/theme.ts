@@ -26,7 +26,11 @@ export function applyTheme(): void {
 /// A button that changes it.
 export function themeButton(): HTMLButtonElement {
   const label = () => `Switch to ${currentTheme() === 'dark' ? 'light' : 'dark'} theme`;
-  const button = h('button', { type: 'button', class: 'icon-button', 'aria-label': label(), title: 'Dark or light theme' }, '◐');
+  const button = h(
+    'button',
+    { type: 'button', class: 'icon-button', 'aria-label': label(), title: 'Dark or light theme' },
+    '◐',
+  );
   button.addEventListener('click', () => {
     const next: Theme = currentTheme() === 'dark' ? 'light' : 'dark';
     document.documentElement.dataset.theme = next;

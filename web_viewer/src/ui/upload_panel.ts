@@ -9,7 +9,13 @@ export class UploadPanel {
   readonly element: HTMLElement;
   private readonly presets = h('select', { id: 'preset', disabled: true });
   private readonly description = h('p', { class: 'hint', id: 'preset-description' });
-  private readonly input = h('input', { type: 'file', id: 'model', accept: kAccepted.join(','), class: 'visually-hidden', multiple: true });
+  private readonly input = h('input', {
+    type: 'file',
+    id: 'model',
+    accept: kAccepted.join(','),
+    class: 'visually-hidden',
+    multiple: true,
+  });
   private readonly list = h('ul', { class: 'uploads', 'aria-label': 'Uploads' });
   private readonly command = h('code', {});
   private known: Preset[] = [];
@@ -22,11 +28,23 @@ export class UploadPanel {
       'section',
       { class: 'upload', 'aria-labelledby': 'upload-title' },
       h('h2', { id: 'upload-title' }, 'Bake a model'),
-      h('label', { class: 'drop', for: 'model' }, h('strong', {}, 'Choose a model'), ' or drop it anywhere on this page', h('span', { class: 'hint' }, 'GLB, self-contained glTF, or PLY')),
+      h(
+        'label',
+        { class: 'drop', for: 'model' },
+        h('strong', {}, 'Choose a model'),
+        ' or drop it anywhere on this page',
+        h('span', { class: 'hint' }, 'GLB, self-contained glTF, or PLY'),
+      ),
       this.input,
       h('div', { class: 'field' }, h('label', { for: 'preset' }, 'Preset'), this.presets, this.description),
       this.list,
-      h('div', { class: 'curl' }, h('span', { class: 'hint' }, 'The same with curl'), this.command, h('button', { type: 'button', onclick: () => void copyText(this.curl(), 'Command') }, 'Copy')),
+      h(
+        'div',
+        { class: 'curl' },
+        h('span', { class: 'hint' }, 'The same with curl'),
+        this.command,
+        h('button', { type: 'button', onclick: () => void copyText(this.curl(), 'Command') }, 'Copy'),
+      ),
     );
     this.acceptDrops();
     void this.loadPresets();
@@ -55,7 +73,8 @@ export class UploadPanel {
 
   private acceptDrops(): void {
     let depth = 0; // enter and leave events of nested elements come in pairs
-    const mark = (change: number) => document.body.classList.toggle('dropping', (depth = Math.max(0, depth + change)) > 0);
+    const mark = (change: number) =>
+      document.body.classList.toggle('dropping', (depth = Math.max(0, depth + change)) > 0);
     const files = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
     window.addEventListener('dragenter', (event) => files(event) && mark(1));
     window.addEventListener('dragleave', (event) => files(event) && mark(-1));
@@ -88,7 +107,10 @@ export class UploadPanel {
     } catch (error) {
       bar.remove();
       row.className = 'refused';
-      row.append(h('span', {}, (error as Error).message), h('button', { type: 'button', 'aria-label': `Dismiss ${file.name}`, onclick: () => row.remove() }, 'Dismiss'));
+      row.append(
+        h('span', {}, (error as Error).message),
+        h('button', { type: 'button', 'aria-label': `Dismiss ${file.name}`, onclick: () => row.remove() }, 'Dismiss'),
+      );
       toast(`${file.name} was refused`, 'error');
     }
   }

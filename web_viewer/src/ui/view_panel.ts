@@ -63,7 +63,12 @@ export class ViewPanel {
       { id: 'off', label: 'Plain' },
     ];
     return [
-      this.controls.slider('ev', 'Exposure', { min: -6, max: 6, step: 0.1, show: (v) => `${v > 0 ? '+' : ''}${v.toFixed(1)} EV` }),
+      this.controls.slider('ev', 'Exposure', {
+        min: -6,
+        max: 6,
+        step: 0.1,
+        show: (v) => `${v > 0 ? '+' : ''}${v.toFixed(1)} EV`,
+      }),
       this.controls.select('tone', 'Tone mapping', () => tones).element,
       this.controls.select('background', 'Background', () => backgrounds).element,
     ];
@@ -79,10 +84,20 @@ export class ViewPanel {
       { id: 'coefficient', label: 'One coefficient' },
     ];
     const { channels, slots } = viewer.model.transfer;
-    const slot = h('div', { class: 'sub' }, controls.number('slot', 'Coefficient', 0, slots - 1), slotName(viewer, controls));
+    const slot = h(
+      'div',
+      { class: 'sub' },
+      controls.number('slot', 'Coefficient', 0, slots - 1),
+      slotName(viewer, controls),
+    );
     if (channels === 3) slot.prepend(controls.numbered('channel', 'Channel', ['red', 'green', 'blue']));
     controls.bind('mode', (mode) => (slot.hidden = mode !== 'coefficient'));
-    return [controls.select('mode', 'Surface', () => modes).element, slot, controls.checkbox('wire', 'Wireframe'), compareSwitch(viewer, controls)];
+    return [
+      controls.select('mode', 'Surface', () => modes).element,
+      slot,
+      controls.checkbox('wire', 'Wireframe'),
+      compareSwitch(viewer, controls),
+    ];
   }
 
   dispose(): void {
