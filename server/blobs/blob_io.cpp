@@ -1,0 +1,40 @@
+#include "server/blobs/blob_io.h"
+
+#include <fcntl.h>
+
+#include <vector>
+
+namespace kiln {
+namespace {
+
+constexpr std::size_t kPiece = 256 * 1024;
+
+}  // namespace
+
+tl::unexpected<Fault> io_fault(int error, const char* doing) {
+  if (error == ENOSPC || error == EDQUOT) return fault("disk_full", "the disk of the server is full");
+  return fault("io_failed", std::string("the server could not ") + doing + " (errno " + std::to_string(error) + ")");
+}
+
+Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder) {
+  const int fd = retry_interrupted([&] { return files.open(folder, O_RDONLY | O_DIRECTORY); });
+  if (fd < 0) return io_fault(errno, "open a folder of its store");
+  const int synced = files.fsync(fd);
+  const int error = errno;
+  files.close(fd);
+  if (synced != 0) return io_fault(error, "sync a folder of its store");
+  return {};
+}
+
+Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::span<const std::uint8_t>)>& take) {
+  std::vector<std::uint8_t> piece(kPiece);
+  for (std::int64_t offset = 0;;) {
+    const ssize_t got = retry_interrupted([&] { return files.pread(fd, piece.data(), piece.size(), offset); });
+    if (got < 0) return io_fault(errno, "read a file of its store");
+    if (got == 0) return {};
+    take({piece.data(), static_cast<std::size_t>(got)});
+    offset += got;
+  }
+}
+
+}  // namespace kiln

@@ -1,0 +1,31 @@
+#pragma once
+// The small steps that reading and writing blobs share. Internal to server/blobs.
+
+#include <cerrno>
+#include <filesystem>
+#include <functional>
+#include <span>
+
+#include "core/base/result.h"
+#include "server/blobs/file_layer.h"
+
+namespace kiln {
+
+/// disk_full when `error` says so, else io_failed: "the server could not <doing>".
+tl::unexpected<Fault> io_fault(int error, const char* doing);
+
+/// A system call again while signals interrupt it.
+template <class Call>
+auto retry_interrupted(Call&& call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
+/// Makes the names in a folder durable.
+Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder);
+
+/// Feeds the file to `take` piece by piece.
+Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::span<const std::uint8_t>)>& take);
+
+}  // namespace kiln
