@@ -64,17 +64,24 @@ void Housekeeping::work() {
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, std::min(kReapEvery, collect_every), [&] { return stopping_; })) {
     lock.unlock();
-    if (const auto reaped = place_.store.reap(); reaped && *reaped > 0) {
-      place_.counters.reaped += static_cast<std::uint64_t>(*reaped);
-      place_.bus.announce();
-    }
-    if (Clock::now() - collected >= collect_every) {
-      collected = Clock::now();
-      static_cast<void>(collect_unused_blobs(place_, grace_));  // a full disk now: the next round tries again
-      place_.blobs.expire_partials(kPartialAgeS);
+    const bool collect = Clock::now() - collected >= collect_every;
+    if (collect) collected = Clock::now();
+    try {
+      tidy(collect);
+    } catch (const std::exception&) {  // a folder that cannot be read now: the next round tries again
     }
     lock.lock();
   }
+}
+
+void Housekeeping::tidy(bool collect) {
+  if (const auto reaped = place_.store.reap(); reaped && *reaped > 0) {
+    place_.counters.reaped += static_cast<std::uint64_t>(*reaped);
+    place_.bus.announce();
+  }
+  if (!collect) return;
+  static_cast<void>(collect_unused_blobs(place_, grace_));  // a store that cannot write now: the next round
+  place_.blobs.expire_partials(kPartialAgeS);
 }
 
 }  // namespace kiln

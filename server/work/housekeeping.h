@@ -23,6 +23,7 @@ class Housekeeping {
 
  private:
   void work();
+  void tidy(bool collect);
   WorkPlace place_;
   Millis grace_;
   std::mutex mutex_;

@@ -76,7 +76,13 @@ void Supervisor::run(const Claim& claim) {
   ++place_.counters.claimed;
   place_.counters.claim_latency_ms += claim.job.started_ms - claim.job.created_ms;
   place_.bus.announce();
-  run_job(claim, *signal, place_);
+  try {
+    run_job(claim, *signal, place_);
+  } catch (const std::exception&) {  // a fault of ours ends the job, never the server
+    static_cast<void>(place_.store.fail(claim.ref, {{"internal", "the server failed to run the job", ""}, 500}));
+    ++place_.counters.failed;
+    place_.bus.announce();
+  }
   const std::lock_guard lock(mutex_);
   running_.erase(claim.ref.job_id);
 }
