@@ -4,3 +4,7 @@ if(TARGET kiln_reference_set)
   target_link_libraries(kiln_transfer_rates PRIVATE kiln_prt kiln_reference_set kiln_prt_scenes embree)
   target_compile_definitions(kiln_transfer_rates PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
 endif()
+
+add_executable(kiln_subdivision subdivision.cpp)
+kiln_flags(kiln_subdivision)
+target_link_libraries(kiln_subdivision PRIVATE kiln_prt kiln_prt_scenes)

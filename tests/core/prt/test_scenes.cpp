@@ -30,6 +30,20 @@ void scale(Scene& scene, float factor, const Vec3f& shift) {
   for (Vec3f& p : scene.mesh.position) p = p * factor + shift;
 }
 
+struct BoxCells {
+  int across, up, top;
+};
+
+// Four sides and a top; it stands on something.
+void add_standing_box(Scene& scene, const Vec3f& low, const Vec3f& high, const BoxCells& cells) {
+  const Vec3f x{high.x - low.x, 0, 0}, y{0, high.y - low.y, 0}, z{0, 0, high.z - low.z};
+  add_grid(scene, low + z, x, y, cells.across, cells.up);
+  add_grid(scene, low + z + x, -z, y, cells.across, cells.up);
+  add_grid(scene, low + x, -x, y, cells.across, cells.up);
+  add_grid(scene, low, z, y, cells.across, cells.up);
+  add_grid(scene, low + y + z, x, -z, cells.top, 1);
+}
+
 Vec3f knot_curve(float t) {
   const float r = 2 + std::cos(3 * t);
   return {r * std::cos(2 * t), std::sin(3 * t), r * std::sin(2 * t)};
@@ -119,14 +133,8 @@ void add_sphere(Scene& scene, const Vec3f& center, float radius, int rings, std:
 
 Scene column_scene() {
   Scene scene = empty_scene();
-  constexpr float kHalf = 0.45F, kHeight = 4;
   add_grid(scene, {-5, 0, 5}, {10, 0, 0}, {0, 0, -10}, 10, 10);
-  add_grid(scene, {-kHalf, 0, kHalf}, {2 * kHalf, 0, 0}, {0, kHeight, 0}, 1, 5);
-  add_grid(scene, {kHalf, 0, kHalf}, {0, 0, -2 * kHalf}, {0, kHeight, 0}, 1, 5);
-  add_grid(scene, {kHalf, 0, -kHalf}, {-2 * kHalf, 0, 0}, {0, kHeight, 0}, 1, 5);
-  add_grid(scene, {-kHalf, 0, -kHalf}, {0, 0, 2 * kHalf}, {0, kHeight, 0}, 1, 5);
-  add_grid(scene, {-kHalf, kHeight, kHalf}, {2 * kHalf, 0, 0}, {0, 0, -2 * kHalf}, 2, 1);
-  add_grid(scene, {-kHalf, 0, -kHalf}, {2 * kHalf, 0, 0}, {0, 0, 2 * kHalf}, 1, 1);
+  add_standing_box(scene, {-0.45F, 0, -0.45F}, {0.45F, 4, 0.45F}, {1, 5, 3});
   scale(scene, 0.1F, {0, -0.2F, 0});
   return scene;
 }
@@ -147,8 +155,8 @@ Scene room_scene() {
   add_grid(scene, {-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, kCells, kCells);  // back
   add_grid(scene, {-0.5F, -0.5F, 0.5F}, {0, 0, -1}, {0, 1, 0}, kCells, kCells);  // left
   add_grid(scene, {0.5F, -0.5F, -0.5F}, {0, 0, 1}, {0, 1, 0}, kCells, kCells);   // right
-  add_box(scene, {-0.31F, -0.5F, -0.28F}, {-0.04F, 0.07F, -0.03F}, 1, false);
-  add_box(scene, {0.07F, -0.5F, 0.02F}, {0.34F, -0.22F, 0.29F}, 1, false);
+  add_standing_box(scene, {-0.31F, -0.5F, -0.28F}, {-0.04F, 0.07F, -0.03F}, {1, 1, 1});
+  add_standing_box(scene, {0.07F, -0.5F, 0.02F}, {0.34F, -0.22F, 0.29F}, {1, 1, 1});
   return scene;
 }
 
