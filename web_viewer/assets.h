@@ -12,8 +12,8 @@ struct Asset {
   std::string_view path;        // relative, no leading slash: "index.html", "assets/view-Bq3x.js"
   std::string_view media_type;  // "text/html; charset=utf-8"
   std::span<const std::uint8_t> bytes;
-  std::string_view etag;        // strong and quoted, ready for the header; files below assets/ carry a hash in their
-                                // name and may be cached for ever
+  std::string_view etag;  // strong and quoted, ready for the header; files below assets/ carry a hash in their
+                          // name and may be cached for ever
 };
 
 /// All files, sorted by path. Where dist/ was absent when Kiln was built: index.html, view.html and docs.html, each one

@@ -35,6 +35,7 @@ if(NOT EXISTS ${DIST}/index.html)
 endif()
 
 file(GLOB_RECURSE files RELATIVE ${folder} ${folder}/*)
+list(FILTER files EXCLUDE REGEX "(^|/)\\.")  # stamps of build scripts
 list(SORT files)
 set(index 0)
 set(blobs "")

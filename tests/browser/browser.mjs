@@ -10,6 +10,7 @@ const kWebGl = process.env.KILN_WEBGL ?? 'gl-egl'; // Mesa's llvmpipe: 2 to 6 ti
 
 /// Why browser tests cannot run here, or nothing.
 export function whatIsMissing() {
+  if (Number(process.versions.node.split('.')[0]) < 20) return `Playwright needs Node 20, this is ${process.version}`;
   if (!existsSync(kChromium)) return `no Chromium at ${kChromium}`;
   if (!existsSync(`${kDist}/index.html`)) return 'web_viewer/dist is not built: cd web_viewer && npx vite build';
   try {

@@ -129,6 +129,23 @@ for (const [name, { hash, light, sky, rotation = 0, intensity = 1, lamps = true 
     }));
 }
 
+test('a click on the model tells the light there', () =>
+  withViewer('light=constant', async (page) => {
+    await settled(page);
+    const vertex = await pickVertex(page);
+    const box = await page.locator('.stage').boundingBox();
+    await page.mouse.click(box.x + vertex.x * box.width, box.y + (1 - vertex.y) * box.height);
+    const shown = (await page.locator('.probe').innerText()).match(/[-\d.]+(?=[, ])/g).map(Number);
+    const { order } = baked.extension;
+    const light = projectSky(
+      kSkies.find(({ id }) => id === 'constant'),
+      order,
+    );
+    const value = valueAt(baked.extension, baked.parts[kPart], vertex.v, light);
+    // Three digits are shown, and the click is rounded to a pixel.
+    value.forEach((v, c) => assert.ok(Math.abs(shown[c] - v) < 0.02, `${shown} for ${value}`));
+  }));
+
 test('turning the light changes pixels; turning it back restores them', () =>
   withViewer('light=studio&tone=none', async (page) => {
     const vertex = await pickVertex(page);

@@ -26,6 +26,7 @@ import { applyTheme } from '../ui/theme';
 import { ViewPanel } from '../ui/view_panel';
 import { bindAddress } from './address';
 import { listenToKeys, resetView } from './keyboard';
+import { Probe } from './probe';
 import { acceptDrops, turnLightByDragging } from './pointer';
 import { saveScreenshot } from './screenshot';
 import { Stage } from './stage';
@@ -130,6 +131,7 @@ function furnish(viewer: Viewer, job: Job, report: Report | null): void {
   const panel = new ViewPanel(viewer, statistics(viewer, report));
   const divider = new Divider(area, state);
   const legend = new LegendBox();
+  const probe = new Probe(area, viewer);
   area.append(legend.element);
   main.append(panel.element);
   viewer.onLegend = (shown) => legend.show(shown, kLegendTitles[state.get().mode] ?? '');
@@ -145,6 +147,7 @@ function furnish(viewer: Viewer, job: Job, report: Report | null): void {
     listenToKeys(stage, state, viewer.asset.hasOriginal, actions),
     () => panel.dispose(),
     () => divider.dispose(),
+    () => probe.dispose(),
   );
   document.documentElement.dataset.ready = 'true';
   Object.assign(window, { kilnViewer: viewer, kilnDispose: dispose });

@@ -5,6 +5,7 @@ import { h } from './dom';
 const kHelp: readonly [string, string][] = [
   ['Drag · arrow keys', 'orbit'],
   ['Right drag · Shift + arrow keys', 'pan'],
+  ['Click', 'the number at that point'],
   ['Wheel · pinch · Page Up, Page Down', 'zoom'],
   ['Shift + drag · [ and ]', 'turn the light'],
   ['+ and −', 'exposure'],
