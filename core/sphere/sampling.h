@@ -8,7 +8,8 @@
 namespace kiln {
 
 /// Point `index` of a two-dimensional Owen-scrambled Sobol sequence; every seed gives an independent scrambling.
-/// Any first 2^k points are stratified in all elementary intervals.  Both numbers in [0, 1).  Cost 80 ns (measured on a busy core).
+/// Any first 2^k points are stratified in all elementary intervals.  Both numbers in [0, 1).
+/// Cost    80 ns (tests/bench/sphere_rates.cpp, on a busy core)
 /// Paper   Burley 2020, "Practical Hash-based Owen Scrambling" (index shuffled, then both dimensions scrambled).
 Vec2f sobol_owen(std::uint32_t index, std::uint64_t seed);
 
