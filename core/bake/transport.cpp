@@ -1,8 +1,10 @@
 #include "core/bake/transport.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
+#include "core/mesh/topology.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/interreflection.h"
 #include "core/trace/tracer.h"
@@ -80,9 +82,29 @@ struct Direct {
   std::vector<float> columns;
 };
 
+/// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
+/// only. So a quarter of the budget first goes to the longest triangles: with positions as values, eq. 3 is a
+/// triangle's perimeter.
+Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
+  const std::uint64_t budget = plan.subdivide.triangles / 4;
+  if (budget <= mesh.triangles.size()) return mesh;
+  const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
+  const ValueSource positions = [](std::span<const TransferPoint> points) {
+    std::vector<float> values;
+    for (const TransferPoint& p : points) values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
+    return values;
+  };
+  // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
+  const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
+  return subdivide(mesh, 3, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
+                   threads)
+      .mesh;
+}
+
 Direct bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
   if (!plan.split) return {mesh, source(vertex_points(mesh))};
-  Subdivided refined = subdivide(mesh, source.width(), std::ref(source), plan.subdivide, threads);
+  const Mesh base = plan.bounces > 0 ? refine_base(mesh, plan, threads) : mesh;
+  Subdivided refined = subdivide(base, source.width(), std::ref(source), plan.subdivide, threads);
   return {std::move(refined.mesh), std::move(refined.values)};
 }
 
