@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "client_cli/commands.h"
 #include "client_cli/files.h"
@@ -33,13 +35,25 @@ json scene_facts(const Scene& scene) {
           {"warnings", warnings}};
 }
 
-/// Every attribute of the file's primitives with its accessor type and number of elements.
+/// The meshes of the scene that viewers show; an artefact has its geometry a second time with the original materials.
+json shown_meshes(const json& gltf) {
+  const json meshes = gltf.value("meshes", json::array());
+  if (!gltf.contains("scenes") || gltf["scenes"].size() < 2) return meshes;
+  json shown = json::array();
+  for (const json& node : gltf["scenes"][0].value("nodes", json::array())) {
+    const json& used = gltf.at("nodes").at(node.get<std::size_t>());
+    if (used.contains("mesh")) shown.push_back(meshes.at(used["mesh"].get<std::size_t>()));
+  }
+  return shown;
+}
+
+/// Every attribute with its type and its number of elements over all primitives.
 json attributes_of(const json& gltf) {
   json out = json::object();
-  for (const json& mesh : gltf.value("meshes", json::array())) {
-    for (const json& primitive : mesh.value("primitives", json::array())) {
-      const json attributes = primitive.value("attributes", json::object());
-      for (const auto& [name, accessor] : attributes.items()) {
+  const json meshes = shown_meshes(gltf);
+  for (const json& mesh : meshes) {
+    for (const json& primitive : mesh.at("primitives")) {
+      for (const auto& [name, accessor] : primitive.at("attributes").items()) {
         const json& used = gltf.at("accessors").at(accessor.get<std::size_t>());
         out[name]["type"] = used.at("type");
         out[name]["elements"] = out[name].value("elements", std::uint64_t{0}) + used.at("count").get<std::uint64_t>();
@@ -49,20 +63,30 @@ json attributes_of(const json& gltf) {
   return out;
 }
 
-/// Bytes of the views that hold Draco geometry.
+/// Bytes of compressed geometry. Several views may name the same bytes.
 std::uint64_t draco_bytes(const json& gltf) {
-  std::vector<std::size_t> views;
-  for (const json& mesh : gltf.value("meshes", json::array())) {
-    for (const json& primitive : mesh.value("primitives", json::array())) {
+  std::map<std::uint64_t, std::uint64_t> length_at;
+  const json meshes = gltf.value("meshes", json::array());
+  for (const json& mesh : meshes) {
+    for (const json& primitive : mesh.at("primitives")) {
       const auto pointer = json::json_pointer("/extensions/KHR_draco_mesh_compression/bufferView");
-      if (primitive.contains(pointer)) views.push_back(primitive[pointer].get<std::size_t>());
+      if (!primitive.contains(pointer)) continue;
+      const json& view = gltf.at("bufferViews").at(primitive[pointer].get<std::size_t>());
+      length_at[view.value("byteOffset", std::uint64_t{0})] = view.at("byteLength").get<std::uint64_t>();
     }
   }
-  std::sort(views.begin(), views.end());
-  views.erase(std::unique(views.begin(), views.end()), views.end());
   std::uint64_t bytes = 0;
-  for (const std::size_t view : views) bytes += gltf.at("bufferViews").at(view).at("byteLength").get<std::uint64_t>();
+  for (const auto& [offset, length] : length_at) bytes += length;
   return bytes;
+}
+
+/// "_PRT_10" after "_PRT_9".
+bool natural_less(const std::string& a, const std::string& b) {
+  const auto split = [](const std::string& name) {
+    const auto digits = name.find_last_not_of("0123456789") + 1;
+    return std::make_tuple(name.substr(0, digits), name.size(), name);
+  };
+  return split(a) < split(b);
 }
 
 json light_facts(const BakedScene& baked) {
@@ -149,8 +173,13 @@ std::string facts_text(const json& facts) {
     out += line("per vertex", text + std::string(" bytes"));
   }
   const json attributes = facts.value("attributes", json::object());
-  for (const auto& [name, attribute] : attributes.items())
+  std::vector<std::string> names;
+  for (const auto& item : attributes.items()) names.push_back(item.key());
+  std::sort(names.begin(), names.end(), natural_less);
+  for (const std::string& name : names) {
+    const json& attribute = attributes[name];
     out += line("attribute", name + " " + attribute["type"].get<std::string>() + " x " + attribute["elements"].dump());
+  }
   for (const json& w : facts["warnings"])
     out += line("warning", w["where"].get<std::string>() + " " + w["message"].get<std::string>());
   if (facts.contains("certificate"))

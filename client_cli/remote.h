@@ -19,7 +19,7 @@ struct JobInput {
   std::string idempotency_key;  // empty: none
 };
 
-/// Uploads bytes under their hash unless the server knows them; the hash.
+/// Uploads bytes under their hash unless the server knows them; goes on where an earlier upload broke. The hash.
 Outcome<std::string> upload_asset(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& name);
 
 /// Uploads the scene if it is not known and posts the job to /v1/jobs. A .gltf with files beside it, or an environment

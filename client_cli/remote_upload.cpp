@@ -10,6 +10,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kBytes = "application/octet-stream";
+constexpr int kUploadTries = 3;  // an upload that broke goes on where it broke
 
 std::string_view view_of(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -89,13 +90,19 @@ Outcome<HttpReply> post_job(ServerLink& link, const std::string& path, const Job
 }  // namespace
 
 Outcome<std::string> upload_asset(ServerLink& link, std::span<const std::uint8_t> bytes, const std::string& name) {
-  const std::string hash = sha256_hex(bytes);
-  KILN_TRY(known, link.head("/v1/assets/" + hash));
-  if (known == 200) return hash;
-  say("uploading " + name + ", " + human_bytes(static_cast<double>(bytes.size())));
-  const auto sent = link.put("/v1/assets/" + hash, {}, {kBytes, {view_of(bytes)}});
-  if (!sent) return tl::make_unexpected(sent.error());
-  return hash;
+  const std::string hash = sha256_hex(bytes), path = "/v1/assets/" + hash;
+  for (int attempt = 0;; ++attempt) {
+    KILN_TRY(known, link.head(path));
+    if (known.status == 200) return hash;
+    const std::uint64_t start = known.upload_offset < bytes.size() ? known.upload_offset : 0;
+    say((start > 0 ? "going on with " : "uploading ") + name + ", " +
+        human_bytes(static_cast<double>(bytes.size() - start)));
+    const auto sent =
+        link.put(path, {{"Upload-Offset", std::to_string(start)}}, {kBytes, {view_of(bytes.subspan(start))}});
+    if (sent) return hash;
+    if (sent.error().exit != ExitCode::unreachable || attempt == kUploadTries) return tl::make_unexpected(sent.error());
+    if (!sleep_unless_interrupted(1, link.session().interrupt)) return interrupted();
+  }
 }
 
 Outcome<JobReply> submit_job(ServerLink& link, const JobInput& input) {

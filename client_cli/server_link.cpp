@@ -158,9 +158,9 @@ Outcome<HttpReply> ServerLink::get(const std::string& path) {
   return connection_->reply([&] { return connection_->client.Get(connection_->prefix + path); });
 }
 
-Outcome<int> ServerLink::head(const std::string& path) {
+Outcome<HeadReply> ServerLink::head(const std::string& path) {
   KILN_TRY(response, connection_->request([&] { return connection_->client.Head(connection_->prefix + path); }));
-  return response.status;
+  return HeadReply{response.status, std::strtoull(response.get_header_value("Upload-Offset").c_str(), nullptr, 10)};
 }
 
 Outcome<HttpReply> ServerLink::remove(const std::string& path) {

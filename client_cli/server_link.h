@@ -22,6 +22,11 @@ struct HttpReply {
   std::string body;
 };
 
+struct HeadReply {
+  int status = 0;
+  std::uint64_t upload_offset = 0;  // bytes of an unfinished upload that the server has
+};
+
 /// A request body in pieces that stay where they are; the sum of them is sent.
 struct HttpBody {
   std::string media_type;
@@ -41,8 +46,8 @@ class ServerLink {
   ServerLink(ServerLink&&) noexcept;
 
   Outcome<HttpReply> get(const std::string& path);
-  /// The status of a HEAD request, whatever it is.
-  Outcome<int> head(const std::string& path);
+  /// What HEAD tells, whatever its status.
+  Outcome<HeadReply> head(const std::string& path);
   Outcome<HttpReply> remove(const std::string& path);
   Outcome<HttpReply> post(const std::string& path, const HttpHeaders&, const HttpBody&);
   Outcome<HttpReply> put(const std::string& path, const HttpHeaders&, const HttpBody&);

@@ -65,6 +65,7 @@ class Remote : public ::testing::Test {
   int bad_downloads = 0;    // downloads with a wrong byte
   bool never_ends = false;  // the stream stays open
   bool known = false;       // HEAD of an asset finds it
+  std::size_t already = 0;  // bytes of the scene that an earlier upload left
 
   std::atomic<int> uploads{0}, streams{0}, downloads{0}, cancels{0};
   std::mutex mutex;
@@ -77,10 +78,15 @@ class Remote : public ::testing::Test {
   std::string url, scene = folder.write("plane.gltf", plane_gltf());
 
   void SetUp() override {
-    server.Get(R"(/v1/assets/.*)", [this](const auto&, auto& reply) { reply.status = known ? 200 : 404; });
+    server.Get(R"(/v1/assets/.*)", [this](const auto&, auto& reply) {
+      reply.status = known ? 200 : 404;
+      if (already > 0) reply.set_header("Upload-Offset", std::to_string(already));
+    });
     server.Put(R"(/v1/assets/(.*))", [this](const httplib::Request& request, auto& reply) {
       ++uploads;
-      reply.status = request.matches[1] == hash_of(request.body) ? 201 : 422;
+      const std::string whole = folder.read("plane.gltf").substr(0, already) + request.body;
+      const bool placed = request.get_header_value("Upload-Offset") == std::to_string(already);
+      reply.status = placed && request.matches[1] == hash_of(whole) ? 201 : 422;
     });
     server.Post("/v1/jobs", [this](const httplib::Request& request, auto& reply) { submit(request, reply); });
     server.Get("/v1/jobs", [this](const auto&, auto& reply) {
@@ -179,6 +185,13 @@ TEST_F(Remote, WhatTheServerKnowsIsNotSentAgain) {
   known = true;
   EXPECT_EQ(bake().exit, 0);
   EXPECT_EQ(uploads, 0);
+}
+
+TEST_F(Remote, AnUploadGoesOnWhereItBroke) {
+  already = 100;
+  const Ran ran = bake();
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(uploads, 1);
 }
 
 TEST_F(Remote, AnEnvironmentFileTravelsWithItsName) {
