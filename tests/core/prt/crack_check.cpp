@@ -1,9 +1,10 @@
 #include "tests/core/prt/crack_check.h"
 
 #include <algorithm>
-#include <map>
+#include <unordered_map>
 #include <utility>
 
+#include "core/base/random.h"
 #include "core/mesh/midpoint.h"
 #include "core/mesh/welder.h"
 
@@ -11,6 +12,11 @@ namespace kiln::testing {
 namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
+
+struct EdgeHash {
+  std::size_t operator()(const Edge& e) const { return mix64(std::uint64_t{e.first} << 32 | e.second); }
+};
+using EdgeCount = std::unordered_map<Edge, int, EdgeHash>;
 
 struct Edges {
   Welder welder;
@@ -24,8 +30,8 @@ struct Edges {
   }
 
   // Triangles on each edge; edges whose ends coincide have no length and are left out.
-  std::map<Edge, int> count(const Mesh& mesh) {
-    std::map<Edge, int> result;
+  EdgeCount count(const Mesh& mesh) {
+    EdgeCount result;
     for (const Triangle& t : mesh.triangles) {
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t a = id(mesh.position[t[k]]), b = id(mesh.position[t[(k + 1) % 3]]);
@@ -37,7 +43,7 @@ struct Edges {
 };
 
 // Whether pieces in `after` make up the edge, cut at exact middles.
-bool covered(Edges& edges, const std::map<Edge, int>& after, const Edge& edge) {
+bool covered(Edges& edges, const EdgeCount& after, const Edge& edge) {
   if (after.contains(edge)) return true;
   const std::size_t known = edges.point.size();
   const std::uint32_t middle = edges.id(kiln::middle(edges.point[edge.first], edges.point[edge.second]));
@@ -58,10 +64,10 @@ std::string name(const Edges& edges, const Edge& e) {
 
 std::string find_crack(const Mesh& input, const Mesh& output) {
   Edges edges;
-  const std::map<Edge, int> before = edges.count(input), after = edges.count(output);
+  const EdgeCount before = edges.count(input), after = edges.count(output);
 
   // What each piece of an input edge must carry: the triangles of all input edges it is a piece of.
-  std::map<Edge, int> expected;
+  EdgeCount expected;
   std::vector<std::pair<Edge, int>> open(before.begin(), before.end());
   while (!open.empty()) {
     const auto [edge, triangles] = open.back();
