@@ -61,7 +61,11 @@ FakeService::FakeService() {
   std::string name = (std::filesystem::temp_directory_path() / "kiln-http-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
   folder_ = name;
-  blobs_ = open_store(folder_);
+}
+
+BlobStore& FakeService::blobs() {
+  std::call_once(blobs_once_, [this] { blobs_ = open_store(folder_); });
+  return *blobs_;
 }
 
 FakeService::~FakeService() {
@@ -85,7 +89,7 @@ void FakeService::succeed(const std::string& id, const std::map<std::string, std
   const std::lock_guard lock(mutex_);
   Job& job = jobs_.at(id);
   for (const auto& [name, text] : files) {
-    auto writer = blobs_->write();
+    auto writer = blobs().write();
     if (!writer->write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}))
       throw std::runtime_error("write");
     auto stored = writer->finish();
@@ -212,14 +216,14 @@ Result<OpenArtifact> FakeService::open_artifact(const std::string& id, const std
   KILN_TRY(job, get(id));
   for (const Artifact& artifact : job.artifacts) {
     if (artifact.name != name) continue;
-    KILN_TRY(reader, blobs_->open_blob(artifact.sha256));
+    KILN_TRY(reader, blobs().open_blob(artifact.sha256));
     return OpenArtifact{artifact, std::move(reader)};
   }
   return fault("not_found", "the job has no such file");
 }
 
 Result<std::unique_ptr<AssetUpload>> FakeService::put_asset(const AssetRequest& request) {
-  auto writer = request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset);
+  auto writer = request.sha256.empty() ? blobs().write() : blobs().write_named(request.sha256, request.offset);
   if (!writer) return tl::make_unexpected(writer.error());
   return std::unique_ptr<AssetUpload>(std::make_unique<FakeUpload>(std::move(*writer)));
 }

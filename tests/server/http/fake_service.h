@@ -39,17 +39,20 @@ class FakeService : public Service {
                                                  std::optional<std::uint64_t> after) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
-  bool has_asset(const std::string& sha256) override { return blobs_->exists(sha256); }
-  std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
-  Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
+  bool has_asset(const std::string& sha256) override { return blobs().exists(sha256); }
+  std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
+  Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
   ServiceStats stats() override { return {}; }
   std::vector<std::string> unready_reasons() override;
 
  private:
   friend class FakeStream;
+  /// Made when first asked for: a store of blobs syncs hundreds of folders.
+  BlobStore& blobs();
   void record(Job& job, EventKind kind, const std::string& message = {});
 
   std::filesystem::path folder_;
+  std::once_flag blobs_once_;
   std::unique_ptr<BlobStore> blobs_;
   std::mutex mutex_;
   std::condition_variable changed_;
