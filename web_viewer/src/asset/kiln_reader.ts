@@ -39,7 +39,7 @@ export interface TransferPart {
   mesh: Mesh;
   geometry: BufferGeometry;
   albedo: [number, number, number]; // base colour factor; the map multiplies it; `_albedo`, if there, replaces it per vertex
-  emission: [number, number, number];
+  emission: [number, number, number]; // where it has no texture; a textured one is the original material's
   material: number; // index of the original material, -1 if none
 }
 

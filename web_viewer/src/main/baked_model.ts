@@ -4,13 +4,14 @@ import {
   Box3,
   BufferAttribute,
   type BufferGeometry,
+  Color,
   DynamicDrawUsage,
   type Material,
   type Mesh,
   type MeshBasicMaterial,
-  type MeshStandardMaterial,
   type Object3D,
   type ShaderMaterial,
+  SRGBColorSpace,
   type Texture,
 } from 'three';
 import {
@@ -21,7 +22,7 @@ import {
 } from '../asset/kiln_reader';
 import type { LoadedAsset } from '../asset/load_gltf';
 import type { PartData } from '../light/messages';
-import { bakedMaterial } from '../shaders/baked_material';
+import { bakedMaterial, type Glow } from '../shaders/baked_material';
 
 export interface BakedPart {
   mesh: Mesh<BufferGeometry, Material>;
@@ -33,7 +34,7 @@ export class BakedModel {
   readonly parts: BakedPart[] = [];
   readonly root: Object3D;
   readonly bounds: Box3;
-  private readonly ownedMaterials = new Set<Material>();
+  private readonly owned = new Set<Material | Texture>();
 
   private constructor(
     asset: LoadedAsset,
@@ -80,17 +81,14 @@ export class BakedModel {
   private async dress(part: TransferPart, asset: LoadedAsset): Promise<BakedPart> {
     const geometry = part.geometry;
     const unlit = part.mesh.material as MeshBasicMaterial;
-    const original =
-      part.material < 0
-        ? undefined
-        : ((await asset.gltf.parser.getDependency('material', part.material)) as MeshStandardMaterial);
-    this.ownedMaterials.add(unlit);
-    if (original) this.ownedMaterials.add(original);
+    const glow = await loadGlow(asset, part.material);
+    this.owned.add(unlit);
+    if (glow) this.owned.add(glow.map);
     const light = new BufferAttribute(new Float32Array(3 * geometry.getAttribute('position').count), 3);
     geometry.setAttribute('light', light.setUsage(DynamicDrawUsage));
     const material = bakedMaterial({
       unlit,
-      original,
+      glow,
       albedo: part.albedo,
       emission: part.emission,
       vertexAlbedo: geometry.hasAttribute('_albedo'),
@@ -105,7 +103,7 @@ export class BakedModel {
       mesh.geometry.dispose();
       material.dispose();
     }
-    disposeMaterials(this.ownedMaterials);
+    disposeAll(this.owned);
   }
 }
 
@@ -123,10 +121,28 @@ function takeTransfer(transfer: RadianceTransfer, part: TransferPart): PartData 
   };
 }
 
-/// Materials and every texture they hold.
-export function disposeMaterials(materials: Iterable<Material>): void {
-  for (const material of materials) {
-    for (const value of Object.values(material)) if ((value as Texture | null)?.isTexture) (value as Texture).dispose();
-    material.dispose();
+/// The emission texture of an original material, and nothing else of it: its other textures are not needed here.
+async function loadGlow({ gltf }: LoadedAsset, material: number): Promise<Glow | null> {
+  const definition = (gltf.parser.json as { materials?: GltfMaterial[] }).materials?.[material];
+  if (!definition?.emissiveTexture) return null;
+  const loaded: { emissiveMap?: Texture } = {};
+  await gltf.parser.assignTexture(loaded, 'emissiveMap', definition.emissiveTexture, SRGBColorSpace);
+  if (!loaded.emissiveMap) return null;
+  const [r, g, b] = definition.emissiveFactor ?? [0, 0, 0];
+  const strength = definition.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+  return { map: loaded.emissiveMap, factor: new Color().setRGB(r, g, b).multiplyScalar(strength) };
+}
+
+interface GltfMaterial {
+  emissiveTexture?: { index: number };
+  emissiveFactor?: [number, number, number];
+  extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number } };
+}
+
+/// Textures, and materials with every texture they hold.
+export function disposeAll(owned: Iterable<Material | Texture>): void {
+  for (const one of owned) {
+    for (const value of Object.values(one)) if ((value as Texture | null)?.isTexture) (value as Texture).dispose();
+    one.dispose();
   }
 }

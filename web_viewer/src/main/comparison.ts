@@ -12,7 +12,7 @@ import {
   Scene,
   type Texture,
 } from 'three';
-import { disposeMaterials } from './baked_model';
+import { disposeAll } from './baked_model';
 import type { Sun } from '../light/skies';
 import type { Stage } from './stage';
 import { SkyBackground } from '../shaders/sky_background';
@@ -83,6 +83,6 @@ export class Comparison {
       geometry?.dispose();
       for (const one of [material].flat()) if (one) materials.add(one);
     });
-    disposeMaterials(materials);
+    disposeAll(materials);
   }
 }

@@ -22,7 +22,8 @@ export class Probe {
       this.start = event.button === 0 && !event.shiftKey ? { x: event.clientX, y: event.clientY } : null;
     };
     const up = (event: PointerEvent) => {
-      if (this.start && Math.hypot(event.clientX - this.start.x, event.clientY - this.start.y) < kStill) this.read(event);
+      if (this.start && Math.hypot(event.clientX - this.start.x, event.clientY - this.start.y) < kStill)
+        this.read(event);
     };
     const unsubscribe = viewer.state.subscribe(() => (this.box.hidden = true));
     area.append(this.box);

@@ -3,15 +3,7 @@
 // `value` (attribute `light`, linear RGB) was computed by the light worker; nothing here depends on the number of coefficients.
 // Exposure and tone mapping are three's (renderer.toneMapping): the same for baked and original materials.
 
-import {
-  Color,
-  type Material,
-  Matrix3,
-  type MeshBasicMaterial,
-  type MeshStandardMaterial,
-  ShaderMaterial,
-  type Texture,
-} from 'three';
+import { Color, type Material, Matrix3, type MeshBasicMaterial, ShaderMaterial, type Texture } from 'three';
 
 const vertexShader = /* glsl */ `
 attribute vec3 light;
@@ -86,9 +78,15 @@ void main() {
   #include <colorspace_fragment>
 }`;
 
+/// Emission through a texture, which the extension leaves to the original material.
+export interface Glow {
+  map: Texture;
+  factor: Color;
+}
+
 export interface BakedLook {
   unlit: MeshBasicMaterial; // of scene 0: base colour texture, alpha mode, sides
-  original?: MeshStandardMaterial; // of scene 1: emission texture
+  glow: Glow | null; // emission through a texture
   albedo: readonly number[];
   emission: readonly number[];
   vertexAlbedo: boolean;
@@ -103,8 +101,8 @@ const transformOf = (map?: Texture | null): Matrix3 => {
 };
 
 /// Owns only itself; the textures belong to the model.
-export function bakedMaterial({ unlit, original, albedo, emission, vertexAlbedo }: BakedLook): ShaderMaterial {
-  const [albedoMap, emissionMap] = [unlit.map, original?.emissiveMap ?? null];
+export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo }: BakedLook): ShaderMaterial {
+  const [albedoMap, emissionMap] = [unlit.map, glow?.map ?? null];
   const defines: Record<string, string> = {};
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (albedoMap) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(albedoMap)];
@@ -119,7 +117,7 @@ export function bakedMaterial({ unlit, original, albedo, emission, vertexAlbedo 
       albedo: { value: new Color().setRGB(albedo[0], albedo[1], albedo[2]) },
       alpha: { value: unlit.opacity },
       alphaCutoff: { value: unlit.alphaTest },
-      emission: { value: new Color().setRGB(emission[0], emission[1], emission[2]) },
+      emission: { value: glow?.factor ?? new Color().setRGB(emission[0], emission[1], emission[2]) },
       white: { value: false },
       albedoMap: { value: albedoMap },
       albedoMapTransform: { value: transformOf(albedoMap) },
