@@ -1,6 +1,6 @@
 // Rays per second of transfer and of an interreflection pass, against the same rays sent to Embree with nothing else
 // done: in one process, turn by turn, medians. One JSON line for each scene and kind.
-//   kiln_transfer_rates [points] [rounds]
+//   kiln_transfer_rates [points] [rounds] [scene]
 
 #include <embree3/rtcore.h>
 #include <malloc.h>
@@ -236,11 +236,14 @@ int main(int argc, char** argv) {
   using namespace kiln;
   const std::size_t points = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 4096;
   const int rounds = argc > 2 ? std::atoi(argv[2]) : 5;
+  const std::string only = argc > 3 ? argv[3] : "";
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // large arrays go back to the system when freed, so that the peak is ours
   Threads threads(2);
   const std::pair<const char*, const char*> scenes[] = {{"bunny", "references/bunny.glb"},
                                                         {"cornell", "references/cornell.glb"},
                                                         {"dungeon", "scenes/dungeon-interior/level-dungeon.gltf"}};
   for (const auto& [name, path] : scenes) {
+    if (!only.empty() && only != name) continue;
     const std::optional<Scene> scene = testing::load_scene(KILN_SHARED, path);
     if (!scene) {
       std::fprintf(stderr, "%s is not there\n", path);
