@@ -6,6 +6,7 @@
 
 #include "core/base/random.h"
 #include "core/prt/morton.h"
+#include "core/prt/row_sum.h"
 #include "core/sphere/sampling.h"
 #include "core/sphere/sh.h"
 
@@ -42,9 +43,9 @@ void DirectionSets::turn(int set, int packet, const Basis<float>& basis, Rays16&
   const std::size_t first = index(set, packet * kPacket);
   const float *x = x_.data() + first, *y = y_.data() + first, *z = z_.data() + first;
   const auto [bx, by, bz] = basis;
-  for (std::size_t i = 0; i < kPacket; ++i) out.dx[i] = bx.x * x[i] + by.x * y[i] + bz.x * z[i];
-  for (std::size_t i = 0; i < kPacket; ++i) out.dy[i] = bx.y * x[i] + by.y * y[i] + bz.y * z[i];
-  for (std::size_t i = 0; i < kPacket; ++i) out.dz[i] = bx.z * x[i] + by.z * y[i] + bz.z * z[i];
+  combine16(x, y, z, {bx.x, by.x, bz.x}, out.dx.data());
+  combine16(x, y, z, {bx.y, by.y, bz.y}, out.dy.data());
+  combine16(x, y, z, {bx.z, by.z, bz.z}, out.dz.data());
 }
 
 LocalFrame local_frame(const DirectionSets& sets, const Vec3f& normal, std::uint64_t seed, std::uint64_t item) {

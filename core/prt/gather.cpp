@@ -20,7 +20,7 @@ Gatherer::Gatherer(const GatherSource& source)
   const auto stride = static_cast<std::size_t>(source.rows.stride());
   plain_sum_.resize(stride);
   textured_sum_.resize(stride);
-  weight_.resize(stride);
+  weight_.resize(stride + 8);  // fill_weights runs over
   result_.resize(static_cast<std::size_t>(source.rows.width()));
 }
 
@@ -38,10 +38,12 @@ void Gatherer::gather(const TransferPoint& point) {
     p.rays.ox.fill(origin.x), p.rays.oy.fill(origin.y), p.rays.oz.fill(origin.z), p.rays.far.fill(kFar);
   }
   const int count = source_.sets.samples() / kPacket;
-  for (int step = 0; step < count + 2; ++step) {
-    if (step < count) trace(packets_[static_cast<std::size_t>(step % 3)], frame, step);
-    if (step >= 1 && step < count + 1) choose(packets_[static_cast<std::size_t>((step - 1) % 3)]);
-    if (step >= 2) add(packets_[static_cast<std::size_t>((step - 2) % 3)]);
+  const auto packet = [&](int step) -> Packet& { return packets_[static_cast<std::size_t>(step) % packets_.size()]; };
+  for (int step = 0; step < count + 3; ++step) {
+    if (step < count) trace(packet(step), frame, step);
+    if (step >= 1 && step < count + 1) choose(packet(step - 1));
+    if (step >= 2 && step < count + 2) tap(packet(step - 2));
+    if (step >= 3) add(packet(step - 3));
   }
   rays_ += static_cast<std::uint64_t>(source_.sets.samples());
   finish();
@@ -54,6 +56,7 @@ void Gatherer::trace(Packet& packet, const LocalFrame& frame, int index) {
   for (const std::uint32_t t : packet.hits.triangle) {
     if (t == kNoHit) continue;
     __builtin_prefetch(&triangles[t]);
+    __builtin_prefetch(&source_.tracer.scene().mesh.part[t]);
     source_.faces.prefetch(t);
   }
 }
@@ -78,8 +81,16 @@ void Gatherer::choose(Packet& packet) {
     packet.vertex[i] = vertex;
     prefetch_row(source_.rows.row(vertex), source_.rows.stride());
     if (!source_.fixed.empty()) __builtin_prefetch(&source_.fixed[vertex]);
-    if (!source_.faces.is_plain(t))
-      packet.tap[i] = source_.albedo.tap(t, u, v, static_cast<std::uint32_t>(random_.next()));
+    if (!source_.faces.is_plain(t)) source_.albedo.prefetch(t);
+  }
+}
+
+void Gatherer::tap(Packet& packet) {
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const std::uint32_t t = packet.hits.triangle[i];
+    if (packet.vertex[i] == kNoHit || source_.faces.is_plain(t)) continue;
+    const auto draw = static_cast<std::uint32_t>(random_.next());
+    packet.tap[i] = source_.albedo.tap(t, packet.hits.u[i], packet.hits.v[i], draw);
   }
 }
 
@@ -101,9 +112,8 @@ void Gatherer::add(const Packet& packet) {
 
 void Gatherer::add_textured(const Packet& packet, std::size_t lane) {
   const Vec3f albedo = source_.albedo.read(packet.tap[lane]);
-  const int count = sh_count(source_.order);
-  for (int c = 0; c < source_.channels; ++c)
-    std::fill_n(weight_.begin() + c * count, count, albedo[static_cast<std::size_t>(c)]);
+  const std::array<float, 3> rgb = {albedo.x, albedo.y, albedo.z};
+  fill_weights(rgb.data(), source_.channels, sh_count(source_.order), weight_.data());
   const std::uint32_t vertex = packet.vertex[lane];
   add_weighted_row(source_.rows.row(vertex), weight_.data(), source_.rows.stride(), textured_sum_.data());
   if (!source_.fixed.empty()) fixed_ += albedo * source_.fixed[vertex];

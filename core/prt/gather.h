@@ -4,7 +4,7 @@
 // A ray takes the stored vector of one corner of the face it hits, drawn with its barycentric as probability: the
 // expectation is the interpolated vector, at a third of the memory traffic. Rows of parts with one albedo are stored
 // multiplied by it, so most hits are a sum of integers; other hits weigh the row by the albedo at the hit.
-// Three packets are in flight (trace, choose, add), so that memory is asked for before it is needed.
+// Four packets are in flight (trace, choose, tap, add), so that memory is asked for before it is needed.
 
 #include <cstdint>
 #include <span>
@@ -53,12 +53,13 @@ class Gatherer {
   };
   void trace(Packet&, const LocalFrame&, int packet);
   void choose(Packet&);
+  void tap(Packet&);
   void add(const Packet&);
   void add_textured(const Packet&, std::size_t lane);
   void finish();
 
   const GatherSource& source_;
-  std::array<Packet, 3> packets_;
+  std::array<Packet, 4> packets_;
   Random random_{0, 0};
   std::vector<std::int32_t> plain_sum_;
   std::vector<float> textured_sum_, weight_, result_;

@@ -8,12 +8,20 @@ namespace {
 
 constexpr float kMaxAlbedo = 0.999F;  // as albedo_at
 
-// The texel under a coordinate in [0, 1) or, shifted by the filter, up to half a texel (jitter) outside.
+constexpr float kFarAway = 1e6F;  // coordinates beyond this keep no fraction worth a texel
+
+float floor_of(float x) {  // std::floor is a call without SSE 4.1
+  const auto whole = static_cast<float>(static_cast<int>(x));
+  return whole > x ? whole - 1 : whole;
+}
+
+// The texel under a coordinate, shifted by up to half a texel.
 int wrap_texel(float coordinate, int size, Wrap wrap, float shift) {
-  if (wrap == Wrap::repeat) coordinate -= std::floor(coordinate);
-  if (wrap == Wrap::mirror) coordinate -= 2 * std::floor(0.5F * coordinate);
+  coordinate = std::clamp(coordinate, -kFarAway, kFarAway);
+  if (wrap == Wrap::repeat) coordinate -= floor_of(coordinate);
+  if (wrap == Wrap::mirror) coordinate -= 2 * floor_of(0.5F * coordinate);
   if (wrap == Wrap::clamp) coordinate = std::clamp(coordinate, -1.0F, 2.0F);
-  int texel = static_cast<int>(std::floor(coordinate * static_cast<float>(size) + shift));
+  int texel = static_cast<int>(floor_of(coordinate * static_cast<float>(size) + shift));
   const int period = wrap == Wrap::mirror ? 2 * size : size;
   if (wrap != Wrap::clamp && texel < 0) texel += period;
   if (wrap != Wrap::clamp && texel >= period) texel -= period;
@@ -46,6 +54,14 @@ HitAlbedo::HitAlbedo(const Scene& scene) : mesh_(scene.mesh) {
       source.transform = ref.transform;
     }
     sources_.push_back(source);
+  }
+}
+
+void HitAlbedo::prefetch(std::uint32_t triangle) const {
+  const Source& source = sources_[mesh_.part[triangle]];
+  for (const std::uint32_t v : mesh_.triangles[triangle]) {
+    if (source.texels != nullptr && !source.uv->empty()) __builtin_prefetch(&(*source.uv)[v]);
+    if (source.tinted) __builtin_prefetch(&mesh_.color[v]);
   }
 }
 

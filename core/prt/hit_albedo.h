@@ -23,6 +23,8 @@ class HitAlbedo {
     const std::uint8_t* texel = nullptr;  // sRGB; null: white
     Vec3f tint;                           // factor x vertex colour
   };
+  /// Asks for what a tap of this face will read.
+  void prefetch(std::uint32_t triangle) const;
   /// `draw` is 32 random bits. Asks for the texel's memory.
   Tap tap(std::uint32_t triangle, float u, float v, std::uint32_t draw) const;
   Vec3f read(const Tap&) const;

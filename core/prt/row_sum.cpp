@@ -95,4 +95,24 @@ __attribute__((target_clones("avx2", "default"))) void add_weighted_row(const st
   }
 }
 
+void fill_weights(const float* rgb, int channels, int count, float* weight) {
+  for (int c = 0; c < channels; ++c) {  // each channel runs over into the next, which comes later
+    const float w = rgb[c];
+    const Float8 eight = {w, w, w, w, w, w, w, w};
+    for (int i = 0; i < count; i += 8) std::memcpy(weight + c * count + i, &eight, sizeof eight);
+  }
+}
+
+__attribute__((target_clones("avx2", "default"))) void combine16(const float* x, const float* y, const float* z,
+                                                                 const std::array<float, 3>& abc, float* out) {
+  for (int i = 0; i < 16; i += 8) {
+    Float8 a, b, c;
+    load(a, x + i);
+    load(b, y + i);
+    load(c, z + i);
+    const Float8 sum = abc[0] * a + abc[1] * b + abc[2] * c;
+    std::memcpy(out + i, &sum, sizeof sum);
+  }
+}
+
 }  // namespace kiln
