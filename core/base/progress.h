@@ -8,10 +8,10 @@
 namespace kiln {
 
 struct ProgressEvent {
-  std::string stage;        // "read", "transfer", "bounce 2", ... the order is the bake's
-  std::uint64_t done = 0;   // of total, in units of the stage
+  std::string stage;       // "read", "transfer", "bounce 2", ... the order is the bake's
+  std::uint64_t done = 0;  // of total, in units of the stage
   std::uint64_t total = 0;
-  double fraction = 0;      // of the whole job, in [0, 1], never falling
+  double fraction = 0;  // of the whole job, in [0, 1], never falling
 };
 
 /// Called from any thread, one call at a time. Must return quickly.

@@ -24,7 +24,7 @@ inline tl::unexpected<Fault> fault(std::string code, std::string message, std::s
 }  // namespace kiln
 
 /// Leaves the function with the fault of `expr` if there is one, else names its value `name`.
-#define KILN_TRY(name, expr)                                            \
-  auto name##_result = (expr);                                          \
+#define KILN_TRY(name, expr)                                             \
+  auto name##_result = (expr);                                           \
   if (!name##_result) return tl::make_unexpected(name##_result.error()); \
   auto name = std::move(*name##_result)
