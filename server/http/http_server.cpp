@@ -78,7 +78,8 @@ struct HttpServer::State {
 
 std::vector<std::string> loopback_hosts() { return {"127.0.0.1", "localhost", "[::1]"}; }
 
-HttpServer::HttpServer(HttpOptions options, Service& service) : state_(std::make_unique<State>(options, service)) {
+HttpServer::HttpServer(const HttpOptions& options, Service& service)
+    : state_(std::make_unique<State>(options, service)) {
   raise_descriptor_limit();
 }
 

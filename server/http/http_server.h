@@ -39,7 +39,7 @@ std::vector<std::string> loopback_hosts();
 class HttpServer {
  public:
   /// The service must outlive the server.
-  HttpServer(HttpOptions options, Service& service);
+  HttpServer(const HttpOptions& options, Service& service);
   ~HttpServer();
   /// The port. Fails  bind_failed.
   Result<int> bind();

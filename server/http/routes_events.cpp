@@ -74,7 +74,9 @@ Answer<std::optional<std::uint64_t>> last_seen(const Request& request) {
 Reply stream_reply(RouteContext& context, Pass pass, std::shared_ptr<EventStream> events, bool one_job) {
   Reply reply;
   reply.fields = {{"content-type", "text/event-stream"}, {"cache-control", "no-store"}, {"x-accel-buffering", "no"}};
-  reply.stream = [&context, pass, events, one_job](Sink& sink) { send_events(context, *events, one_job, sink); };
+  reply.stream = [&context, pass = std::move(pass), events = std::move(events), one_job](Sink& sink) {
+    send_events(context, *events, one_job, sink);
+  };
   return reply;
 }
 
