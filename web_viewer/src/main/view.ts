@@ -116,6 +116,7 @@ async function show(job: Job, tools: Tools): Promise<void> {
     ? getReport(job).catch(() => null)
     : Promise.resolve(null);
   const asset = await loadGltf(artifactUrl(job, 'scene.glb'), tools.decoder, loaded);
+  performance.mark('kiln:decoded');
   const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
   const viewer = await Viewer.open(tools.stage, asset, state, tools.relighter);
   undo.push(() => viewer.dispose());
@@ -181,9 +182,11 @@ async function start(): Promise<void> {
   document.body.append(pageHeader(title), main, help);
   overlay.show('Asking for the job', null);
   try {
+    performance.mark('kiln:script');
     const asked = getJob(id);
     asked.catch(() => undefined); // is awaited below
     const tools = createTools();
+    performance.mark('kiln:stage');
     const job = await asked;
     title.textContent = job.label || id;
     document.title = `${job.label || id} – Kiln`;

@@ -60,6 +60,7 @@ export class Viewer {
     const { order, channels, fixed, slots, scale, offset } = model.transfer;
     await relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
     await viewer.relightOnce();
+    performance.mark('kiln:lit');
     await viewer.measureLevel();
     viewer.apply(new Set<keyof ViewState>(['ev', 'tone', 'background', 'wire', 'mode', 'compare']));
     stage.drawNow();
