@@ -23,8 +23,8 @@
 namespace kiln {
 
 struct CertificateOptions {
-  std::size_t points = 256;
-  int samples = 256;       // paths per point; certificate_samples() keeps them to a share of the bake
+  std::size_t points = 1024;
+  int samples = 64;        // paths per point; certificate_samples() keeps them to a share of the bake
   std::uint64_t seed = 0;  // mixed so that it never repeats the bake's own samples
 };
 
@@ -38,7 +38,7 @@ struct Certificate {
   double seconds = 0;
 };
 
-/// Paths per point that cost about 5 % of a bake of `rays`, from 256 to 4096; a function of the rays alone, so that
+/// Paths per point that cost about 5 % of a bake of `rays`, from 64 to 4096; a function of the rays alone, so that
 /// reports repeat.
 int certificate_samples(std::uint64_t rays, std::size_t points);
 

@@ -90,18 +90,20 @@ void plan_lamps(Plan& plan, const Scene& scene) {
 void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision& asked, const Grade& grade) {
   using Mode = PrtStep::Subdivision::Mode;
   const std::uint64_t input = scene.mesh.triangles.size();
-  const std::uint64_t budget = asked.triangles.value_or(std::max(input, grade.triangles));
+  const std::uint64_t budget = asked.triangles.value_or(input + grade.triangles);
   plan.split = asked.mode != Mode::off && budget > input;
   plan.subdivide = {.measure = asked.measure,
                     .alpha = asked.alpha,
                     .threshold = asked.threshold.value_or(grade.threshold),
                     .triangles = budget,
                     .max_depth = asked.max_depth};
-  const std::string reason =
-      asked.mode == Mode::off ? std::string("turned off by the recipe")
-      : plan.split
-          ? "the input's " + std::to_string(input) + " triangles are fewer than the budget"
-          : "the input has " + std::to_string(input) + " triangles already, the budget is " + std::to_string(budget);
+  std::string reason = "the recipe's budget is above the input's " + std::to_string(input) + " triangles";
+  if (!asked.triangles) {
+    reason = std::string("the ") + grade.name + " quality adds " + std::to_string(grade.triangles) +
+             " triangles where light changes";
+  }
+  if (budget <= input) reason = "the input's " + std::to_string(input) + " triangles use up the budget";
+  if (asked.mode == Mode::off) reason = "turned off by the recipe";
   decide(plan, "subdivide", plan.split ? "up to " + std::to_string(budget) + " triangles" : "no", reason);
 }
 

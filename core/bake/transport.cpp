@@ -83,11 +83,11 @@ struct Direct {
 };
 
 /// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
-/// only. So a quarter of the budget first goes to the longest triangles: with positions as values, eq. 3 is a
+/// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
 /// triangle's perimeter.
 Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
-  const std::uint64_t budget = plan.subdivide.triangles / 4;
-  if (budget <= mesh.triangles.size()) return mesh;
+  const std::uint64_t input = mesh.triangles.size();
+  const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
   const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
   const ValueSource positions = [](std::span<const TransferPoint> points) {
     std::vector<float> values;

@@ -40,7 +40,7 @@ TEST(Bake, GivesTheFourArtefactsAndACertificateThatIsSmallOnAnEasyScene) {
   // 256 stratified rays leave about 7 % noise on a transfer vector (anchors.md), less on its product with light.
   EXPECT_LT(certificate["relrmse"].get<double>(), 0.08);
   EXPECT_GT(certificate["relrmse"].get<double>(), 0.0);
-  EXPECT_GE(certificate["points"].get<int>(), 250);
+  EXPECT_GE(certificate["points"].get<int>(), 1000);  // of 1024: nearly all find their place on the input
 }
 
 TEST(Bake, ThreadCountChangesNotOneByteOfTheScene) {
@@ -101,7 +101,7 @@ TEST(Bake, ClosedRoomLitByItsLampAgreesWithThePathTracer) {
   for (const auto& lighting : certificate["lightings"]) {
     if (lighting["name"] != "lamps") continue;
     found = true;
-    EXPECT_LT(lighting["relrmse"].get<double>(), 0.1);  // sharp contact shadows at 8000 triangles
+    EXPECT_LT(lighting["relrmse"].get<double>(), 0.06);  // measured .03 at 8000 triangles
   }
   EXPECT_TRUE(found);
 }
