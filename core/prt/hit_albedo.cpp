@@ -8,6 +8,7 @@ namespace {
 
 constexpr float kMaxAlbedo = 0.999F;  // as albedo_at
 
+constexpr int kMostTexels = 128;   // a side: 64 KB an image, so that taps stay in the cache
 constexpr float kFarAway = 1e6F;  // coordinates beyond this keep no fraction worth a texel
 
 float floor_of(float x) {  // std::floor is a call without SSE 4.1
@@ -46,8 +47,8 @@ HitAlbedo::HitAlbedo(const Scene& scene) : mesh_(scene.mesh) {
     if (texture != nullptr && texture->image >= 0 &&
         !scene.images[static_cast<std::size_t>(texture->image)].rgba.empty()) {
       const Image& image = scene.images[static_cast<std::size_t>(texture->image)];
-      source.texels = image.rgba.data();
-      source.width = image.width, source.height = image.height;
+      const bool whole = material.alpha_mode != AlphaMode::opaque;  // hidden texels have no say
+      source.image = use_image(image, texture->image, whole);
       source.wrap_u = texture->wrap_u, source.wrap_v = texture->wrap_v;
       source.nearest = texture->nearest;
       source.uv = ref.uv_set == 1 ? &scene.mesh.uv1 : &scene.mesh.uv0;
@@ -57,10 +58,42 @@ HitAlbedo::HitAlbedo(const Scene& scene) : mesh_(scene.mesh) {
   }
 }
 
+std::size_t HitAlbedo::use_image(const Image& image, int index, bool whole) {
+  const auto known = std::find_if(images_.begin(), images_.end(),
+                                  [&](const Reduced& r) { return r.index == index && r.whole == whole; });
+  if (known != images_.end()) return static_cast<std::size_t>(known - images_.begin());
+  Reduced to{.index = index, .whole = whole, .width = image.width, .height = image.height};
+  if (!whole) to.width = std::min(to.width, kMostTexels), to.height = std::min(to.height, kMostTexels);
+  for (int y = 0; y < to.height; ++y) {
+    for (int x = 0; x < to.width; ++x) {
+      for (std::size_t c = 0; c < 4; ++c)
+        to.rgba.push_back(c < 3 ? mean_texel(image, to, {x, y}, c) : std::uint8_t{255});
+    }
+  }
+  images_.push_back(std::move(to));
+  return images_.size() - 1;
+}
+
+// The mean of the texels that one texel of `to` stands for, in linear light, back in sRGB.
+std::uint8_t HitAlbedo::mean_texel(const Image& image, const Reduced& to, std::array<int, 2> at, std::size_t c) const {
+  const int x0 = at[0] * image.width / to.width, x1 = (at[0] + 1) * image.width / to.width;
+  const int y0 = at[1] * image.height / to.height, y1 = (at[1] + 1) * image.height / to.height;
+  double sum = 0;
+  for (int y = y0; y < y1; ++y) {
+    const std::uint8_t* row = image.rgba.data() + 4 * (std::ptrdiff_t{y} * image.width);
+    for (int x = x0; x < x1; ++x) sum += linear_[row[4 * x + static_cast<int>(c)]];
+  }
+  const auto mean = static_cast<float>(sum / ((x1 - x0) * (y1 - y0)));
+  const auto above = std::lower_bound(linear_.begin(), linear_.end(), mean);
+  if (above == linear_.begin()) return 0;
+  if (above == linear_.end()) return 255;
+  return static_cast<std::uint8_t>((above - linear_.begin()) - (mean - above[-1] < *above - mean ? 1 : 0));
+}
+
 void HitAlbedo::prefetch(std::uint32_t triangle) const {
   const Source& source = sources_[mesh_.part[triangle]];
   for (const std::uint32_t v : mesh_.triangles[triangle]) {
-    if (source.texels != nullptr && !source.uv->empty()) __builtin_prefetch(&(*source.uv)[v]);
+    if (source.image != kNone && !source.uv->empty()) __builtin_prefetch(&(*source.uv)[v]);
     if (source.tinted) __builtin_prefetch(&mesh_.color[v]);
   }
 }
@@ -74,7 +107,7 @@ HitAlbedo::Tap HitAlbedo::tap(std::uint32_t triangle, float u, float v, std::uin
     const Vec4f &p = mesh_.color[a], &q = mesh_.color[b], &r = mesh_.color[c];
     tap.tint = tap.tint * Vec3f{w * p.x + u * q.x + v * r.x, w * p.y + u * q.y + v * r.y, w * p.z + u * q.z + v * r.z};
   }
-  if (source.texels == nullptr) return tap;
+  if (source.image == kNone) return tap;
   Vec2f uv;
   if (!source.uv->empty()) {
     const Vec2f &p = (*source.uv)[a], &q = (*source.uv)[b], &r = (*source.uv)[c];
@@ -87,11 +120,12 @@ HitAlbedo::Tap HitAlbedo::tap(std::uint32_t triangle, float u, float v, std::uin
 
 const std::uint8_t* HitAlbedo::find_texel(const Source& source, const Vec2f& uv, std::uint32_t draw) const {
   const auto& m = source.transform;
+  const Reduced& image = images_[source.image];
   const float shift_x = source.nearest ? 0 : static_cast<float>(draw >> 16) * 0x1p-16F - 0.5F;
   const float shift_y = source.nearest ? 0 : static_cast<float>(draw & 0xffffU) * 0x1p-16F - 0.5F;
-  const int x = wrap_texel(m[0] * uv.x + m[1] * uv.y + m[2], source.width, source.wrap_u, shift_x);
-  const int y = wrap_texel(m[3] * uv.x + m[4] * uv.y + m[5], source.height, source.wrap_v, shift_y);
-  return source.texels + 4 * (static_cast<std::ptrdiff_t>(y) * source.width + x);
+  const int x = wrap_texel(m[0] * uv.x + m[1] * uv.y + m[2], image.width, source.wrap_u, shift_x);
+  const int y = wrap_texel(m[3] * uv.x + m[4] * uv.y + m[5], image.height, source.wrap_v, shift_y);
+  return image.rgba.data() + 4 * (static_cast<std::ptrdiff_t>(y) * image.width + x);
 }
 
 Vec3f HitAlbedo::read(const Tap& tap) const {

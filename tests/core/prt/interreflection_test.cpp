@@ -182,6 +182,24 @@ TEST(HitAlbedo, TheMeanOfManyTapsIsTheFilteredTexture) {
   }
 }
 
+TEST(HitAlbedo, AFineTextureKeepsItsMeanInLinearLight) {
+  Scene scene = testing::empty_scene();
+  const std::uint32_t part = testing::add_part(scene, {1, 1, 1});
+  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1, part);
+  scene.mesh.uv0 = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
+  Image image{.width = 512, .height = 256, .rgba = {}};
+  for (int i = 0; i < 512 * 256; ++i) {  // black and white columns
+    const auto c = static_cast<std::uint8_t>(i % 2 == 0 ? 0 : 255);
+    image.rgba.insert(image.rgba.end(), {c, c, c, 255});
+  }
+  scene.images.push_back(image);
+  scene.textures = {{.image = 0}};
+  scene.materials[1].base_color_texture = {.texture = 0};
+  const HitAlbedo taps(scene);
+  // One step of 8-bit sRGB at a half is 0.009.
+  EXPECT_NEAR(taps.read(taps.tap(0, 0.3F, 0.3F, 12345U)).x, 0.5F, 0.005F);
+}
+
 TEST(PackedRows, RoundWithinTheStatedError) {
   std::vector<std::int16_t> memory(5000 * 112);
   PackedRows rows(6, 3, memory.data(), PackedRows::row_bytes(6, 3));
