@@ -51,6 +51,7 @@ class Solver {
   }
 
   Transfer solve(Threads& threads, TransferStats* stats) {
+    if (params_.bounces > 0) plan_work();
     out_.coefficients.resize(mesh_.position.size() * (pitch_ / sizeof(float)));
     Layer light = layer(0);  // T_0 = D
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
@@ -94,19 +95,27 @@ class Solver {
     if (!to.fixed.empty()) to.fixed[v] = fixed;
   }
 
+  // The order of work, and who needs any: before the rows are there, since both take memory for a while.
+  void plan_work() {
+    order_ = morton_order(mesh_.position);
+    const SupportTree support(mesh_.position);
+    for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
+      const Vec3f& n = mesh_.normal[v];
+      sees_surfaces_.push_back(support.rises_above(n, dot(n, mesh_.position[v]) + kOpenTolerance));
+    }
+  }
+
   // T_{k+1} = D + K T_k, `bounces` times.
   void iterate(Layer& light, Threads& threads, TransferStats* stats) {
     const DirectionSets sets(0, params_.samples, kSets, mix64(params_.seed));
-    const SupportTree support(mesh_.position);
-    const std::vector<std::uint32_t> order = morton_order(mesh_.position);
     Layer next = layer(1);
     for (int pass = 0; pass < params_.bounces; ++pass) {
       const GatherSource source{tracer_,     lamps_,        faces_,        albedo_, sets,        light.rows,
                                 light.fixed, params_.order, out_.channels, pass,    params_.seed};
       std::atomic<std::uint64_t> rays = 0;
-      threads.for_blocks(order.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      threads.for_blocks(order_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
         Gatherer gatherer(source);
-        for (std::size_t i = begin; i < end; ++i) update(order[i], support, gatherer, pass, next);
+        for (std::size_t i = begin; i < end; ++i) update(order_[i], gatherer, pass, next);
         rays += gatherer.rays();
       });
       if (stats != nullptr) stats->rays += rays;
@@ -114,11 +123,10 @@ class Solver {
     }
   }
 
-  void update(std::uint32_t v, const SupportTree& support, Gatherer& gatherer, int pass, Layer& next) const {
+  void update(std::uint32_t v, Gatherer& gatherer, int pass, Layer& next) const {
     Row row = direct_row(v);
     Vec3f fixed = fixed_at(v);
-    const Vec3f& n = mesh_.normal[v];
-    if (support.rises_above(n, dot(n, mesh_.position[v]) + kOpenTolerance)) {
+    if (sees_surfaces_[v]) {
       gatherer.gather(vertex_point(mesh_, v, face_of_[v]));
       const std::span<const float> reflected = gatherer.result();
       for (std::size_t i = 0; i < reflected.size(); ++i) row[i] += reflected[i];
@@ -151,6 +159,8 @@ class Solver {
   std::vector<std::byte> direct_storage_;
   PackedRows direct_;
   std::vector<Vec3f> fixed_direct_;
+  std::vector<std::uint32_t> order_;
+  std::vector<bool> sees_surfaces_;
   Transfer out_;
   std::size_t pitch_ = 0;
 };

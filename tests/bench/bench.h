@@ -1,11 +1,8 @@
 #pragma once
-// What the benchmarks share: processor time, memory, medians.
+// What the benchmarks share: processor time and medians.
 
 #include <algorithm>
-#include <cstdio>
 #include <ctime>
-#include <fstream>
-#include <string>
 #include <vector>
 
 namespace kiln::bench {
@@ -25,15 +22,5 @@ inline double median(std::vector<double> values) {
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
-
-/// A line of /proc/self/status in bytes: "VmRSS" now, "VmHWM" the peak since forget_peak().
-inline double memory_bytes(const std::string& name) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with(name)) return 1024 * std::stod(line.substr(name.size() + 1));
-  }
-  return 0;
-}
-inline void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 }  // namespace kiln::bench

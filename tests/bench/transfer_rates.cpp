@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <new>
 
 #include "core/prt/gather.h"
 #include "core/prt/interreflection.h"
@@ -17,6 +18,30 @@
 #include "tests/bench/bench.h"
 #include "tests/core/prt/reference_set.h"
 #include "tests/core/prt/test_scenes.h"
+
+// Every allocation of our code is counted, so that the peak does not depend on what the system keeps or takes back.
+static std::atomic<std::size_t> held_bytes = 0, peak_bytes = 0;
+
+static void* count_new(void* p) {
+  if (p == nullptr) throw std::bad_alloc();
+  const std::size_t now = held_bytes += malloc_usable_size(p);
+  for (std::size_t peak = peak_bytes; peak < now && !peak_bytes.compare_exchange_weak(peak, now);) {
+  }
+  return p;
+}
+static void count_delete(void* p) noexcept {
+  held_bytes -= malloc_usable_size(p);
+  free(p);
+}
+void* operator new(std::size_t size) { return count_new(malloc(size)); }
+void* operator new(std::size_t size, std::align_val_t align) {
+  const auto a = static_cast<std::size_t>(align);
+  return count_new(aligned_alloc(a, (size + a - 1) / a * a));
+}
+void operator delete(void* p) noexcept { count_delete(p); }
+void operator delete(void* p, std::size_t) noexcept { count_delete(p); }
+void operator delete(void* p, std::align_val_t) noexcept { count_delete(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { count_delete(p); }
 
 namespace kiln::bench {
 namespace {
@@ -213,20 +238,19 @@ void bench_bounce(const std::string& name, const Scene& scene, const Points& poi
 // Peak memory of a bake beyond the scene and its tracer: direct transfer, then one bounce in RGB, at few samples.
 void bench_memory(const std::string& name, const Scene& scene, Threads& threads) {
   const Tracer tracer(scene, threads);
-  const auto vertices = static_cast<double>(scene.mesh.position.size());
-  malloc_trim(0);  // what earlier cases freed is not to be reused unseen
-  forget_peak();
-  const double before = memory_bytes("VmRSS");
+  const std::size_t vertices = scene.mesh.position.size(), before = held_bytes;
+  peak_bytes = before;
   std::vector<float> direct = bake_direct_transfer(tracer, vertex_points(scene.mesh), {.samples = 16}, threads);
-  const double after_direct = memory_bytes("VmHWM");
-  forget_peak();
-  const Transfer t =
-      bake_interreflection(tracer, scene.mesh, std::move(direct), {}, {.bounces = 2, .samples = 16}, threads);
+  const std::size_t direct_peak = peak_bytes - before;
+  peak_bytes = held_bytes.load();
+  std::vector<Vec3f> fixed(vertices, Vec3f{1, 1, 1});
+  const Transfer t = bake_interreflection(tracer, scene.mesh, std::move(direct), std::move(fixed),
+                                          {.bounces = 2, .samples = 16}, threads);
+  const std::size_t bounce_peak = peak_bytes - before;
   std::printf(
-      "{\"bench\":\"memory\",\"scene\":\"%s\",\"vertices\":%.0f,\"order\":6,\"channels\":%d,"
-      "\"direct_bytes_per_vertex\":%.0f,\"interreflection_bytes_per_vertex\":%.0f,\"result_bytes_per_vertex\":%zu}\n",
-      name.c_str(), vertices, t.channels, (after_direct - before) / vertices,
-      (memory_bytes("VmHWM") - before) / vertices, t.stride() * sizeof(float));
+      "{\"bench\":\"memory\",\"scene\":\"%s\",\"vertices\":%zu,\"order\":6,\"channels\":%d,\"fixed\":true,"
+      "\"direct_bytes_per_vertex\":%zu,\"interreflection_bytes_per_vertex\":%zu,\"result_bytes_per_vertex\":%zu}\n",
+      name.c_str(), vertices, t.channels, direct_peak / vertices, bounce_peak / vertices, t.stride() * sizeof(float));
 }
 
 }  // namespace
@@ -237,7 +261,6 @@ int main(int argc, char** argv) {
   const std::size_t points = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 4096;
   const int rounds = argc > 2 ? std::atoi(argv[2]) : 5;
   const std::string only = argc > 3 ? argv[3] : "";
-  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // large arrays go back to the system when freed, so that the peak is ours
   Threads threads(2);
   const std::pair<const char*, const char*> scenes[] = {{"bunny", "references/bunny.glb"},
                                                         {"cornell", "references/cornell.glb"},
