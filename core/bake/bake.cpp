@@ -96,6 +96,11 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
 
+  if (!light && !plan.lamps) {
+    scene.warnings.push_back(
+        {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
+  }
+
   Transfer transfer = solve_transport(scene, plan, input.recipe.seed, log, threads);
 
   log.begin("write", 0.9);

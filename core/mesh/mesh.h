@@ -15,8 +15,8 @@ using Triangle = std::array<std::uint32_t, 3>;
 /// uv0, uv1, color and tangent are empty or have one element for each vertex.
 struct Mesh {
   std::vector<Vec3f> position;
-  std::vector<Vec3f> normal;   // unit length, always present
-  std::vector<Vec2f> uv0;      // as in glTF: v runs downwards
+  std::vector<Vec3f> normal;  // unit length, always present
+  std::vector<Vec2f> uv0;     // as in glTF: v runs downwards
   std::vector<Vec2f> uv1;
   std::vector<Vec4f> color;    // linear RGBA that multiplies the base colour
   std::vector<Vec4f> tangent;  // xyz unit, w = +-1

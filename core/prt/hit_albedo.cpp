@@ -8,7 +8,7 @@ namespace {
 
 constexpr float kMaxAlbedo = 0.999F;  // as albedo_at
 
-constexpr int kMostTexels = 128;   // a side: 64 KB an image, so that taps stay in the cache
+constexpr int kMostTexels = 128;  // a side: 64 KB an image, so that taps stay in the cache
 constexpr float kFarAway = 1e6F;  // coordinates beyond this keep no fraction worth a texel
 
 float floor_of(float x) {  // std::floor is a call without SSE 4.1
