@@ -10,7 +10,7 @@
 namespace kiln {
 
 struct Preview {
-  int width = 480, height = 320;
+  int width = 384, height = 256;
   int grid = 2;  // grid x grid rays a pixel
 };
 
