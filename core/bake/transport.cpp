@@ -17,14 +17,17 @@ namespace {
 class DirectSource {
  public:
   DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, Threads& threads)
-      : tracer_(tracer), plan_(plan), seed_(seed), threads_(threads) {}
+      : tracer_(tracer),
+        sky_(tracer, {.order = plan.order, .samples = plan.samples, .seed = seed}),
+        plan_(plan),
+        seed_(seed),
+        threads_(threads) {}
 
   int width() const { return sh_count(plan_.order) + (plan_.lamps ? 3 : 0); }
 
   std::vector<float> operator()(std::span<const TransferPoint> batch) {
     points += batch.size();
-    std::vector<float> sky = bake_direct_transfer(
-        tracer_, batch, {.order = plan_.order, .samples = plan_.samples, .seed = seed_}, threads_, &stats);
+    std::vector<float> sky = sky_.bake(batch, threads_, &stats);
     if (!plan_.lamps) return sky;
     const std::vector<Vec3f> lamps =
         bake_fixed_direct(tracer_, batch, {.samples = plan_.lamp_samples, .seed = seed_}, threads_, &stats);
@@ -70,6 +73,7 @@ class DirectSource {
   }
 
   const Tracer& tracer_;
+  DirectTransferBaker sky_;
   const Plan& plan_;
   std::uint64_t seed_;
   Threads& threads_;
