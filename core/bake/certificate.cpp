@@ -151,7 +151,7 @@ ErrorStats statistics(const Samples& samples, std::size_t points, std::uint64_t 
 int certificate_samples(std::uint64_t rays, std::size_t points) {
   // A path is about four rays, one at a time, each six times the cost of a packet's: measured on the bundled scenes.
   const double paths = 0.05 * static_cast<double>(rays) / 24;
-  return static_cast<int>(std::clamp(paths / static_cast<double>(std::max<std::size_t>(points, 1)), 64.0, 4096.0));
+  return static_cast<int>(std::clamp(paths / static_cast<double>(std::max<std::size_t>(points, 1)), 256.0, 4096.0));
 }
 
 Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::optional<Environment>& environment,

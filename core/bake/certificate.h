@@ -24,7 +24,7 @@ namespace kiln {
 
 struct CertificateOptions {
   std::size_t points = 1024;
-  int samples = 64;        // paths per point; certificate_samples() keeps them to a share of the bake
+  int samples = 256;       // paths per point; certificate_samples() keeps them to a share of the bake
   std::uint64_t seed = 0;  // mixed so that it never repeats the bake's own samples
 };
 
@@ -38,8 +38,8 @@ struct Certificate {
   double seconds = 0;
 };
 
-/// Paths per point that cost about 5 % of a bake of `rays`, from 64 to 4096; a function of the rays alone, so that
-/// reports repeat.
+/// Paths per point that cost about 5 % of a bake of `rays` (or about a second), from 256 to 4096; a function of the
+/// rays alone, so that reports repeat.
 int certificate_samples(std::uint64_t rays, std::size_t points);
 
 /// `truth` traces the input's surface; `environment` is the job's own light, if any.
