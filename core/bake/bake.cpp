@@ -116,9 +116,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   if (input.recipe.certificate) {
     log.begin("certificate", 0.97);
     const Tracer truth(baked.scene, threads);
-    CertificateOptions options{.seed = input.recipe.seed};
-    options.samples = certificate_samples(log.rays(), options.points);
-    certificate = certify(decoded, truth, light, options, threads);
+    certificate = certify(decoded, truth, light, {.bake_rays = log.rays(), .seed = input.recipe.seed}, threads);
   }
 
   log.begin("preview", 1.0);

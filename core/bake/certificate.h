@@ -24,8 +24,8 @@ namespace kiln {
 
 struct CertificateOptions {
   std::size_t points = 1024;
-  int samples = 256;       // paths per point; certificate_samples() keeps them to a share of the bake
-  std::uint64_t seed = 0;  // mixed so that it never repeats the bake's own samples
+  std::uint64_t bake_rays = 0;  // what the bake sent: paths cost about 5 % of it, or about a second
+  std::uint64_t seed = 0;       // mixed so that it never repeats the bake's own samples
 };
 
 struct Certificate {
@@ -34,13 +34,9 @@ struct Certificate {
   std::vector<std::string> dark;         // lightings that hardly reach the surface: not judged
   std::optional<ErrorStats> truncation;  // of the job's environment, when it is a map or a formula
   std::size_t points = 0;                // matched on the input surface
-  int samples = 0;
+  int samples = 0;                       // paths per point, from 256 to 4096
   double seconds = 0;
 };
-
-/// Paths per point that cost about 5 % of a bake of `rays` (or about a second), from 256 to 4096; a function of the
-/// rays alone, so that reports repeat.
-int certificate_samples(std::uint64_t rays, std::size_t points);
 
 /// `truth` traces the input's surface; `environment` is the job's own light, if any.
 Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::optional<Environment>& environment,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/bake/bounce_tail.h"
+#include "core/prt/interreflection.h"
 #include "core/sphere/sh.h"
 #include "core/trace/tracer.h"
 
@@ -118,7 +119,7 @@ Prediction predict(const Plan& plan, const Scene& scene, int threads) {
   for (const Image& image : scene.images) out.memory_bytes += image.rgba.size() + image.encoded.size();
   const std::uint64_t per_vertex =
       static_cast<std::uint64_t>(plan.samples + (plan.lamps ? plan.lamp_samples : 0)) +
-      static_cast<std::uint64_t>(plan.bounces) * static_cast<std::uint64_t>(plan.bounce_samples);
+      rays_per_vertex(Interreflection{.bounces = plan.bounces, .samples = plan.bounce_samples});
   out.rays = out.vertices * per_vertex;
   out.seconds = static_cast<double>(out.rays) / (kRaysPerSecond * std::max(1, threads)) + 0.2;
   out.artifact_bytes = out.vertices * (slots * 3 * static_cast<std::uint64_t>(plan.coefficient_bits) / 16 + 8);

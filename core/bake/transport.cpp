@@ -12,8 +12,9 @@
 namespace kiln {
 namespace {
 
-/// Direct light of both kinds at points. Lamps ride along as three more columns, scaled so that a typical lamp value
-/// weighs as much in the split measure as the constant band of an open point.
+/// Direct light of both kinds at points. Lamps ride ahead as four more columns (RGB and nothing: a four of their own in
+/// row_store.h), scaled so that a typical lamp value weighs as much in the split measure as the constant band of an
+/// open point.
 class DirectSource {
  public:
   DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, Threads& threads)
@@ -23,7 +24,16 @@ class DirectSource {
         seed_(seed),
         threads_(threads) {}
 
-  int width() const { return sh_count(plan_.order) + (plan_.lamps ? 3 : 0); }
+  std::size_t lamp_columns() const { return plan_.lamps ? 4 : 0; }
+  std::size_t bands() const { return static_cast<std::size_t>(sh_count(plan_.order)); }
+  std::size_t width() const { return lamp_columns() + bands(); }
+
+  /// Lamp light and the constant band stay within what was sampled: no vertex is darker than black.
+  ValueSource source() {
+    ValueSource s{.width = width(), .values = std::ref(*this), .bounded = {lamp_columns()}};
+    if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
+    return s;
+  }
 
   std::vector<float> operator()(std::span<const TransferPoint> batch) {
     points += batch.size();
@@ -37,14 +47,13 @@ class DirectSource {
 
   /// Takes the joined columns apart again.
   void separate(const std::vector<float>& joined, std::vector<float>& sky, std::vector<Vec3f>& lamps) const {
-    const auto n = static_cast<std::size_t>(sh_count(plan_.order)), stride = static_cast<std::size_t>(width());
-    const std::size_t points = joined.size() / stride;
-    sky.resize(points * n);
+    const std::size_t points = joined.size() / width();
+    sky.resize(points * bands());
     lamps.resize(plan_.lamps ? points : 0);
     for (std::size_t p = 0; p < points; ++p) {
-      const float* row = joined.data() + p * stride;
-      std::copy_n(row, n, sky.data() + p * n);
-      if (plan_.lamps) lamps[p] = Vec3f{row[n], row[n + 1], row[n + 2]} / lamp_scale_;
+      const float* row = joined.data() + p * width();
+      std::copy_n(row + lamp_columns(), bands(), sky.data() + p * bands());
+      if (plan_.lamps) lamps[p] = Vec3f{row[0], row[1], row[2]} / lamp_scale_;
     }
   }
 
@@ -62,12 +71,11 @@ class DirectSource {
   }
 
   std::vector<float> join(const std::vector<float>& sky, const std::vector<Vec3f>& lamps) const {
-    const auto n = static_cast<std::size_t>(sh_count(plan_.order)), stride = static_cast<std::size_t>(width());
-    std::vector<float> joined(lamps.size() * stride);
+    std::vector<float> joined(lamps.size() * width(), 0.0F);
     for (std::size_t p = 0; p < lamps.size(); ++p) {
-      float* row = joined.data() + p * stride;
-      std::copy_n(sky.data() + p * n, n, row);
-      for (std::size_t c = 0; c < 3; ++c) row[n + c] = lamps[p][c] * lamp_scale_;
+      float* row = joined.data() + p * width();
+      for (std::size_t c = 0; c < 3; ++c) row[c] = lamps[p][c] * lamp_scale_;
+      std::copy_n(sky.data() + p * bands(), bands(), row + lamp_columns());
     }
     return joined;
   }
@@ -93,14 +101,15 @@ Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
   const std::uint64_t input = mesh.triangles.size();
   const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
   const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
-  const ValueSource positions = [](std::span<const TransferPoint> points) {
-    std::vector<float> values;
-    for (const TransferPoint& p : points) values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
-    return values;
-  };
+  const ValueSource positions{3, [](std::span<const TransferPoint> points) {
+                                std::vector<float> values;
+                                for (const TransferPoint& p : points)
+                                  values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
+                                return values;
+                              }};
   // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
   const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
-  return subdivide(mesh, 3, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
+  return subdivide(mesh, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
                    threads)
       .mesh;
 }
@@ -108,7 +117,7 @@ Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
 Direct bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
   if (!plan.split) return {mesh, source(vertex_points(mesh))};
   const Mesh base = plan.bounces > 0 ? refine_base(mesh, plan, threads) : mesh;
-  Subdivided refined = subdivide(base, source.width(), std::ref(source), plan.subdivide, threads);
+  Subdivided refined = subdivide(base, source.source(), plan.subdivide, threads);
   return {std::move(refined.mesh), std::move(refined.values)};
 }
 

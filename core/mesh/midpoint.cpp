@@ -18,11 +18,16 @@ Vec4f middle_tangent(const Vec4f& a, const Vec4f& b) {
 
 }  // namespace
 
+Vec3f middle_normal(const Mesh& mesh, std::uint32_t first, std::uint32_t second) {
+  const auto [a, b] = std::minmax(first, second);
+  return normalized(mesh.normal[a] + mesh.normal[b], mesh.normal[a]);
+}
+
 std::uint32_t append_midpoint(Mesh& mesh, std::uint32_t first, std::uint32_t second) {
   const auto [a, b] = std::minmax(first, second);
   const auto vertex = static_cast<std::uint32_t>(mesh.position.size());
   mesh.position.push_back(middle(mesh.position[a], mesh.position[b]));
-  mesh.normal.push_back(normalized(mesh.normal[a] + mesh.normal[b], mesh.normal[a]));
+  mesh.normal.push_back(middle_normal(mesh, a, b));
   if (!mesh.uv0.empty()) mesh.uv0.push_back(middle(mesh.uv0[a], mesh.uv0[b]));
   if (!mesh.uv1.empty()) mesh.uv1.push_back(middle(mesh.uv1[a], mesh.uv1[b]));
   if (!mesh.color.empty()) mesh.color.push_back(middle(mesh.color[a], mesh.color[b]));

@@ -6,7 +6,6 @@ namespace kiln {
 
 std::vector<std::uint32_t> weld_by_position(const std::vector<Vec3f>& position) {
   Welder welder;
-  welder.reserve(position.size());
   std::vector<std::uint32_t> weld(position.size());
   for (std::uint32_t v = 0; v < position.size(); ++v) weld[v] = welder.weld(position[v], v);
   return weld;

@@ -20,9 +20,12 @@ namespace kiln {
 struct Interreflection {
   int order = 6;
   int bounces = 1;    // passes, >= 0
-  int samples = 256;  // closest-hit rays per vertex and pass
+  int samples = 256;  // closest-hit rays per vertex in each of the last two passes; a quarter of them before
   std::uint64_t seed = 0;
 };
+
+/// Rays that all passes send from one vertex.
+std::uint64_t rays_per_vertex(const Interreflection&);
 
 /// `direct` has sh_count(order) values per vertex; `fixed_direct` is empty or one RGB per vertex (direct light of the
 /// scene's lamps). Called with bounces = 0 it only joins the two. Vertices are those of tracer.scene().mesh or of a

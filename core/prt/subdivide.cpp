@@ -1,10 +1,15 @@
 #include "core/prt/subdivide.h"
 
 #include <algorithm>
+#include <cmath>
+#include <deque>
+#include <optional>
 #include <queue>
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
+#include "core/prt/fit_vertices.h"
+#include "core/prt/row_store.h"
 #include "core/prt/split_measure.h"
 #include "core/prt/split_mesh.h"
 
@@ -23,83 +28,119 @@ struct Candidate {
   }
 };
 
+/// The estimate to seven bits. Nothing finer is known, and equal errors are split in the order of the mesh, side by
+/// side, which leaves fewer T-vertices.
+float coarse(float error) {
+  int exponent = 0;
+  const float mantissa = std::frexp(error, &exponent);
+  return std::ldexp(std::round(mantissa * 128), exponent - 7);
+}
+
 class Subdivider {
  public:
-  Subdivider(const Mesh& input, int width, const ValueSource& source, const Subdivide& params)
-      : mesh_(input), width_(static_cast<std::size_t>(width)), source_(source), params_(params) {
-    evaluate(vertex_points(input));
+  Subdivider(const Mesh& input, const ValueSource& source, const Subdivide& params, const Threads& threads)
+      : mesh_(std::in_place, input),
+        rows_(source.width),
+        source_(source),
+        params_(params),
+        batch_(kBatch * static_cast<std::size_t>(threads.count())) {
+    const std::vector<TransferPoint> points = vertex_points(input);
+    for (std::size_t i = 0; i < points.size(); i += batch_) {
+      evaluate(std::span(points).subspan(i, std::min(batch_, points.size() - i)));
+    }
   }
 
   // Figure 2 of the paper, in rounds.
   void run(Threads& threads) {
     queue_new_leaves(threads);
-    while (mesh_.closed_triangles() < params_.triangles && !queue_.empty()) {
+    while (mesh_->closed_triangles() < params_.triangles && !queue_.empty()) {
       split_round();
       queue_new_leaves(threads);
     }
   }
 
-  Subdivided finish(std::size_t input_vertices) {
-    ClosedMesh closed = mesh_.close(input_vertices);
-    evaluate(mesh_.take_new_points());
-    Subdivided result{.mesh = std::move(closed.mesh), .depth = std::move(closed.depth), .evaluated = evaluated_};
-    result.values.reserve(closed.vertex.size() * width_);
-    for (const std::uint32_t v : closed.vertex) {
-      const Values values = at(v);
-      result.values.insert(result.values.end(), values.begin(), values.end());
+  Subdivided finish(std::size_t input_vertices, Threads& threads) {
+    ClosedMesh closed = mesh_->close(input_vertices);
+    evaluate(mesh_->take_new_points());
+    mesh_.reset();  // its tables are not wanted any more; the fit needs the room
+    Subdivided result;
+    if (params_.measure == SplitMeasure::residual) {
+      result.values = fit_vertices(closed, std::move(rows_), source_.bounded, threads);
+    } else {
+      result.values.resize(closed.point.size() * rows_.width());
+      for (std::size_t v = 0; v < closed.point.size(); ++v) {
+        rows_.load(closed.point[v], result.values.data() + v * rows_.width());
+      }
     }
+    result.mesh = std::move(closed.mesh);
+    result.depth = std::move(closed.depth);
+    result.evaluated = evaluated_;
     return result;
   }
 
  private:
-  Values at(std::uint32_t vertex) const { return Values(values_).subspan(vertex * width_, width_); }
-
-  std::vector<float> call_source(const std::vector<TransferPoint>& points) {
+  std::vector<float> call_source(std::span<const TransferPoint> points) {
     if (points.empty()) return {};
-    std::vector<float> values = source_(points);
-    EXPECTS(values.size() == points.size() * width_);
+    std::vector<float> values = source_.values(points);
+    EXPECTS(values.size() == points.size() * rows_.width());
     evaluated_ += points.size();
     return values;
   }
 
-  void evaluate(const std::vector<TransferPoint>& points) {
-    const std::vector<float> values = call_source(points);
-    values_.insert(values_.end(), values.begin(), values.end());
-  }
+  void evaluate(std::span<const TransferPoint> points) { rows_.append(call_source(points)); }
 
   void split_round() {
     const float least = kRound * queue_.top().error;
-    while (!queue_.empty() && queue_.top().error >= least && mesh_.closed_triangles() < params_.triangles) {
+    while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < params_.triangles) {
       const std::uint32_t leaf = queue_.top().leaf;
       queue_.pop();
-      mesh_.split(leaf, params_.triangles);
+      mesh_->split(leaf, params_.triangles);
     }
   }
 
   // Estimates the error of every leaf that came since the last call and queues those above the threshold.
   void queue_new_leaves(Threads& threads) {
-    threads.check();
-    const auto end = static_cast<std::uint32_t>(mesh_.leaves().size());
-    std::vector<std::uint32_t> fresh;
-    for (std::uint32_t leaf = seen_leaves_; leaf < end; ++leaf) {
-      if (mesh_.leaves()[leaf].depth < params_.max_depth) fresh.push_back(leaf);
-    }
-    seen_leaves_ = end;
-    const std::vector<float> error =
-        params_.measure == SplitMeasure::residual ? residuals(fresh, threads) : edge_errors(fresh, threads);
-    for (std::size_t i = 0; i < fresh.size(); ++i) {
-      if (error[i] > params_.threshold && error[i] > 0) queue_.push({error[i], fresh[i]});
+    const auto end = static_cast<std::uint32_t>(mesh_->leaves().size());
+    while (seen_leaves_ < end) {
+      threads.check();
+      std::vector<std::uint32_t> fresh;
+      for (; seen_leaves_ < end && fresh.size() < batch_; ++seen_leaves_) {
+        if (mesh_->leaves()[seen_leaves_].depth < params_.max_depth) fresh.push_back(seen_leaves_);
+      }
+      const std::vector<float> error =
+          params_.measure == SplitMeasure::residual ? residuals(fresh, threads) : edge_errors(fresh, threads);
+      for (std::size_t i = 0; i < fresh.size(); ++i) {
+        if (error[i] > params_.threshold && error[i] > 0) queue_.push({coarse(error[i]), fresh[i]});
+      }
     }
   }
 
+  /// Rows of some points, unpacked: the columns of `points` one after the other.
+  template <std::size_t N>
+  std::array<Values, N> load(const std::array<std::uint32_t, N>& points, std::vector<float>& room) const {
+    std::array<Values, N> rows;
+    room.resize(N * rows_.width());
+    for (std::size_t k = 0; k < N; ++k) {
+      rows_.load(points[k], room.data() + k * rows_.width());
+      rows[k] = Values(room).subspan(k * rows_.width(), rows_.width());
+    }
+    return rows;
+  }
+
+  std::array<std::uint32_t, 3> points_of(const Triangle& corner) const {
+    return {mesh_->point_of(corner[0]), mesh_->point_of(corner[1]), mesh_->point_of(corner[2])};
+  }
+
   std::vector<float> edge_errors(const std::vector<std::uint32_t>& leaves, Threads& threads) {
-    evaluate(mesh_.take_new_points());
+    evaluate(mesh_->take_new_points());
     std::vector<float> error(leaves.size());
     threads.for_blocks(leaves.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<float> room;
       for (std::size_t i = begin; i < end; ++i) {
-        const auto& [a, b, c] = mesh_.leaves()[leaves[i]].corner;
-        const std::vector<Vec3f>& normal = mesh_.mesh().normal;
-        error[i] = edge_measure(params_, {at(a), at(b), at(c)}, {normal[a], normal[b], normal[c]});
+        const Triangle& corner = mesh_->leaves()[leaves[i]].corner;
+        const std::vector<Vec3f>& normal = mesh_->mesh().normal;
+        error[i] = edge_measure(params_, load(points_of(corner), room),
+                                {normal[corner[0]], normal[corner[1]], normal[corner[2]]});
       }
     });
     return error;
@@ -107,25 +148,28 @@ class Subdivider {
 
   // Midpoints become vertices when their edge splits, so their values are kept; a centroid never does.
   std::vector<float> residuals(const std::vector<std::uint32_t>& leaves, Threads& threads) {
-    std::vector<Triangle> middle;
+    std::vector<std::array<std::uint32_t, 6>> points;  // corners, then the middles that follow each
     std::vector<TransferPoint> centroid;
     for (const std::uint32_t index : leaves) {
-      const SplitLeaf leaf = mesh_.leaves()[index];
+      const SplitLeaf leaf = mesh_->leaves()[index];
       const auto& [a, b, c] = leaf.corner;
-      middle.push_back({mesh_.midpoint(leaf, a, b), mesh_.midpoint(leaf, b, c), mesh_.midpoint(leaf, c, a)});
+      const auto [pa, pb, pc] = points_of(leaf.corner);
+      points.push_back({pa, pb, pc, mesh_->middle_point(leaf, a, b), mesh_->middle_point(leaf, b, c),
+                        mesh_->middle_point(leaf, c, a)});
       centroid.push_back(centroid_point(leaf.corner));
     }
-    evaluate(mesh_.take_new_points());
-    const std::vector<float> inner = call_source(centroid);
+    evaluate(mesh_->take_new_points());
+    RowStore inner(rows_.width());  // rounded as the others are: a constant has no residual
+    inner.append(call_source(centroid));
 
     std::vector<float> error(leaves.size());
     threads.for_blocks(leaves.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<float> room, middle(rows_.width());
       for (std::size_t i = begin; i < end; ++i) {
-        const Triangle& corner = mesh_.leaves()[leaves[i]].corner;
-        const auto& [a, b, c] = corner;
-        const auto& [ab, bc, ca] = middle[i];
-        error[i] = residual_measure({at(a), at(b), at(c)}, {at(ab), at(bc), at(ca)},
-                                    Values(inner).subspan(i * width_, width_), triangle_area(mesh_.mesh(), corner));
+        const auto [a, b, c, ab, bc, ca] = load(points[i], room);
+        inner.load(i, middle.data());
+        error[i] = residual_measure({a, b, c}, {ab, bc, ca}, middle,
+                                    triangle_area(mesh_->mesh(), mesh_->leaves()[leaves[i]].corner));
       }
     });
     return error;
@@ -133,7 +177,7 @@ class Subdivider {
 
   TransferPoint centroid_point(const Triangle& corner) const {
     const auto& [a, b, c] = corner;
-    const Mesh& m = mesh_.mesh();
+    const Mesh& m = mesh_->mesh();
     const Vec3f face_normal = normalized(area_vector(m, corner), m.normal[a]);
     const Vec3f middle = (m.position[a] + m.position[b] + m.position[c]) / 3.0F;
     return {.position = middle,
@@ -143,30 +187,30 @@ class Subdivider {
   }
 
   static constexpr std::size_t kBlock = 256;
-  SplitMesh mesh_;
-  std::size_t width_;
+  static constexpr std::size_t kBatch = 512;  // leaves or points at a time and thread: 0.3 MB not packed yet
+  std::optional<SplitMesh> mesh_;
+  RowStore rows_;  // of every point of mesh_
   const ValueSource& source_;
   const Subdivide& params_;
-  std::vector<float> values_;  // of every vertex of mesh_, used in the end or not
-  std::priority_queue<Candidate> queue_;
+  std::size_t batch_;
+  std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
   std::uint64_t evaluated_ = 0;
 };
 
 }  // namespace
 
-Subdivided subdivide(const Mesh& input, int width, const ValueSource& source, const Subdivide& params,
-                     Threads& threads) {
-  EXPECTS(width > 0);
+Subdivided subdivide(const Mesh& input, const ValueSource& source, const Subdivide& params, Threads& threads) {
+  EXPECTS(source.width > 0);
   EXPECTS(params.max_depth >= 0 && params.max_depth <= kMaxSplitDepth);
   if (params.triangles <= input.triangles.size() || params.max_depth == 0) {
     const std::vector<TransferPoint> points = vertex_points(input);
-    return {input, points.empty() ? std::vector<float>{} : source(points),
+    return {input, points.empty() ? std::vector<float>{} : source.values(points),
             std::vector<std::uint8_t>(input.triangles.size(), 0), points.size()};
   }
-  Subdivider subdivider(input, width, source, params);
+  Subdivider subdivider(input, source, params, threads);
   subdivider.run(threads);
-  return subdivider.finish(input.position.size());
+  return subdivider.finish(input.position.size(), threads);
 }
 
 }  // namespace kiln

@@ -1,6 +1,9 @@
 #pragma once
 // Adaptive subdivision: vertices where transferred light changes.
 // Paper   Krivanek, Pattanaik, Zara 2004: figure 2 (loop), figure 3 (splits), eqs. 2-4 (measures).
+// Beyond  `residual` knows values halfway along the edges; they make the vertices better (fit_vertices.h).
+// Memory  at order 6 about 600 bytes a final vertex besides the mesh: rows of vertices and edge middles (row_store.h)
+// Error   rows are kept in 16 bits: 2^-13 of the largest of four neighbouring columns
 
 #include <cstdint>
 #include <functional>
@@ -27,14 +30,19 @@ struct Subdivide {
 
 struct Subdivided {
   Mesh mesh;                        // no T-vertex, no crack; part ids kept; all attributes interpolated
-  std::vector<float> values;        // values[v * width + i] for its vertices
+  std::vector<float> values;        // values[v * width + i] for its vertices; as sampled, or fitted (residual)
   std::vector<std::uint8_t> depth;  // of each triangle: how often its input triangle was split
   std::uint64_t evaluated = 0;      // points at which the source was called; each point once
 };
 
-/// Evaluates `width` numbers (a transfer vector, and the fixed light) at each point; called with large batches.
-using ValueSource = std::function<std::vector<float>(std::span<const TransferPoint>)>;
+/// What is wanted at points: a transfer vector, and the light of lamps.
+struct ValueSource {
+  std::size_t width = 0;  // numbers of a point
+  /// width numbers of each point; called with thousands of points at once.
+  std::function<std::vector<float>(std::span<const TransferPoint>)> values;
+  std::vector<std::size_t> bounded = {};  // columns that no vertex may have outside the range sampled around it
+};
 
-Subdivided subdivide(const Mesh&, int width, const ValueSource&, const Subdivide&, Threads&);
+Subdivided subdivide(const Mesh&, const ValueSource&, const Subdivide&, Threads&);
 
 }  // namespace kiln

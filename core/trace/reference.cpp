@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -65,8 +66,15 @@ class Estimator {
     return light_.environments.size() + light_.sh.size() + (light_.scene_lights ? 1 : 0);
   }
 
-  /// Adds one path from `start` to sum[lighting].
-  void add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+  /// Adds one path from `start` to sum[lighting]. Returns its vertices.
+  int add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+
+  std::uint64_t rays_per_vertex() const {
+    std::uint64_t rays = 1;
+    for (const EnvironmentSampler& sampler : samplers_) rays += sampler.useful() ? 1 : 0;
+    if (light_.scene_lights) rays += (emitters_.empty() ? 0 : 1) + scene_.lights.size();
+    return rays;
+  }
 
  private:
   void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
@@ -153,10 +161,11 @@ void Estimator::add_lamps(const Vertex& v, const Vec3d& weight, int depth, PathN
   sum.back() += weight * light;
 }
 
-void Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
   Vertex v = start;
   Vec3d weight{1, 1, 1};
-  for (int depth = 0;; ++depth) {
+  int depth = 0;
+  for (;; ++depth) {
     const Vec3d local = cosine_hemisphere(numbers.pair(depth));
     add_sky_samples(v, weight, depth, numbers, sum);
     add_lamps(v, weight, depth, numbers, sum);
@@ -164,11 +173,14 @@ void Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<
     const Vec3d w = normalized(basis_around(v.normal).to_world(local));
     const double density = std::max(local.z, 1e-30) / std::numbers::pi;
     const Hit hit = tracer_.closest(lifted(v), to_float(w), kFar);
-    if (!hit) return add_sky(w, density, weight, sum);
+    if (!hit) {
+      add_sky(w, density, weight, sum);
+      break;
+    }
 
     const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
     const Part& part = scene_.parts[scene_.mesh.part[hit.triangle]];
-    if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) return;
+    if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) break;
     const double side = hit.back ? -1 : 1;
     const Vec3d face = to_double(p.geometric_normal) * side;
     if (light_.scene_lights && emitters_.density(hit.triangle) > 0) {
@@ -177,16 +189,17 @@ void Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<
       sum.back() += times(weight, emission_at(scene_, p)) * (density / (density + other));
     }
 
-    if (depth == options_.bounces) return;
+    if (depth == options_.bounces) break;
     weight = times(weight, albedo_at(scene_, p));
     const double alive = std::min(1.0, largest(weight));
     if (options_.bounces < 0 && depth >= kSafeBounces) {
-      if (numbers.number() >= alive) return;
+      if (numbers.number() >= alive) break;
       weight = weight / alive;
     }
-    if (alive <= 0) return;
+    if (alive <= 0) break;
     v = {to_double(p.position), to_double(p.normal) * side, face};
   }
+  return depth + 1;
 }
 
 void check_light(const ReferenceLight& light) {
@@ -206,15 +219,18 @@ ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferenceP
   const int half = (options.samples + 1) / 2;
   const std::vector<Vec3d> zero(lightings * points.size());
   ReferenceResult result{zero, zero, zero};
+  std::atomic<std::uint64_t> vertices = 0;
 
   threads.for_blocks(points.size(), 1, [&](std::size_t point, std::size_t) {
     const ReferencePoint& p = points[point];
     const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
     std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
+    std::uint64_t visited = 0;
     for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
       PathNumbers numbers(options.seed, point, sample);
-      estimator.add_path(start, numbers, sums[sample % 2]);
+      visited += static_cast<std::uint64_t>(estimator.add_path(start, numbers, sums[sample % 2]));
     }
+    vertices += visited;
     for (std::size_t k = 0; k < lightings; ++k) {
       const std::size_t i = k * points.size() + point;
       result.half_a[i] = sums[0][k] / half;
@@ -222,6 +238,7 @@ ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferenceP
       result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
     }
   });
+  result.rays = vertices * estimator.rays_per_vertex();
   return result;
 }
 

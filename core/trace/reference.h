@@ -48,6 +48,7 @@ struct ReferenceOptions {
 struct ReferenceResult {
   std::vector<Vec3d> value;           // mean of both halves
   std::vector<Vec3d> half_a, half_b;  // independent halves (even and odd samples)
+  std::uint64_t rays = 0;             // at most: one path ray at each vertex, and one to each light it may look for
 };
 
 ReferenceResult trace_reference(const Tracer&, std::span<const ReferencePoint>, const ReferenceLight&,

@@ -149,18 +149,19 @@ void run(Bench& bench, std::size_t points, Threads& threads) {
   const Tracer tracer(bench.scene, threads);
   bench.truth = make_truth(bench.scene, tracer, points, threads);
   const DirectTransferBaker baker(tracer, {.order = kOrder, .samples = bench.samples, .seed = 1});
-  const ValueSource source = [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); };
+  const ValueSource source{kWidth, [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); }, {0}};
   for (const std::uint64_t budget : bench.uniform) {
     // eq. 3 on positions is the perimeter: the largest triangle is split first. Transfer comes afterwards.
-    const ValueSource positions = [](std::span<const TransferPoint> points) {
-      std::vector<float> values;
-      for (const TransferPoint& p : points) values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
-      return values;
-    };
+    const ValueSource positions{3, [](std::span<const TransferPoint> points) {
+                                  std::vector<float> values;
+                                  for (const TransferPoint& p : points)
+                                    values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
+                                  return values;
+                                }};
     const double start = process_seconds();
     Subdivided result =
-        subdivide(bench.scene.mesh, 3, positions, {.measure = SplitMeasure::eq3, .triangles = budget}, threads);
-    result.values = source(vertex_points(result.mesh));
+        subdivide(bench.scene.mesh, positions, {.measure = SplitMeasure::eq3, .triangles = budget}, threads);
+    result.values = source.values(vertex_points(result.mesh));
     report(bench, "uniform", budget, result, process_seconds() - start);
   }
   const std::pair<const char*, SplitMeasure> measures[] = {{"eq2", SplitMeasure::eq2},
@@ -170,7 +171,7 @@ void run(Bench& bench, std::size_t points, Threads& threads) {
   for (const auto& [name, measure] : measures) {
     const double start = process_seconds();
     const Subdivided result =
-        subdivide(bench.scene.mesh, kWidth, source, {.measure = measure, .triangles = bench.adaptive}, threads);
+        subdivide(bench.scene.mesh, source, {.measure = measure, .triangles = bench.adaptive}, threads);
     report(bench, name, bench.adaptive, result, process_seconds() - start);
   }
 }

@@ -14,6 +14,7 @@
 #include "core/prt/gather.h"
 #include "core/prt/interreflection.h"
 #include "core/prt/morton.h"
+#include "core/prt/subdivide.h"
 #include "core/sphere/sh.h"
 #include "tests/bench/bench.h"
 #include "tests/core/prt/reference_set.h"
@@ -253,6 +254,29 @@ void bench_memory(const std::string& name, const Scene& scene, Threads& threads)
       name.c_str(), vertices, t.channels, direct_peak / vertices, bounce_peak / vertices, t.stride() * sizeof(float));
 }
 
+// Peak memory of adaptive subdivision by residuals to twice the triangles, beside the input and its tracer; the final
+// mesh is in it, and given apart.
+void bench_subdivision_memory(const std::string& name, const Scene& scene, Threads& threads) {
+  constexpr std::size_t kBands = 36;
+  const Tracer tracer(scene, threads);
+  const DirectTransferBaker baker(tracer, {.samples = 16});
+  const ValueSource source{
+      kBands, [&](std::span<const TransferPoint> points) { return baker.bake(points, threads); }, {0}};
+  const std::size_t before = held_bytes;
+  peak_bytes = before;
+  const Subdivided fine = subdivide(scene.mesh, source, {.triangles = 2 * scene.mesh.triangles.size()}, threads);
+  const Mesh& m = fine.mesh;
+  const std::size_t mesh = m.position.size() * sizeof(Vec3f) * 2 + m.uv0.size() * sizeof(Vec2f) +
+                           m.uv1.size() * sizeof(Vec2f) + (m.color.size() + m.tangent.size()) * sizeof(Vec4f) +
+                           m.triangles.size() * (sizeof(Triangle) + sizeof m.part[0] + 1);
+  std::printf(
+      "{\"bench\":\"subdivision_memory\",\"scene\":\"%s\",\"vertices\":%zu,\"triangles\":%zu,\"order\":6,"
+      "\"bytes_per_vertex\":%zu,\"mesh_bytes_per_vertex\":%zu}\n",
+      name.c_str(), m.position.size(), m.triangles.size(), (peak_bytes - before) / m.position.size(),
+      mesh / m.position.size());
+  std::fflush(stdout);
+}
+
 }  // namespace
 }  // namespace kiln::bench
 
@@ -276,5 +300,6 @@ int main(int argc, char** argv) {
     bench::bench_transfer(name, *scene, chosen, rounds, threads);
     bench::bench_bounce(name, *scene, chosen, rounds, threads);
     bench::bench_memory(name, *scene, threads);
+    bench::bench_subdivision_memory(name, *scene, threads);
   }
 }

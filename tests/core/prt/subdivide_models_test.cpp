@@ -51,7 +51,7 @@ void check_folder(const std::string& folder) {
     const std::uint64_t budget = mesh.triangles.size() + std::min<std::uint64_t>(3000, 2 * mesh.triangles.size() + 8);
     for (const SplitMeasure measure : {SplitMeasure::eq3, SplitMeasure::residual}) {
       if (measure == SplitMeasure::eq3 && mesh.triangles.size() > 50'000) continue;  // once is enough for time
-      const Subdivided fine = subdivide(mesh, 1, rings, {.measure = measure, .triangles = budget}, threads);
+      const Subdivided fine = subdivide(mesh, {1, rings}, {.measure = measure, .triangles = budget}, threads);
       EXPECT_LE(fine.mesh.triangles.size(), budget) << path;
       EXPECT_EQ(testing::find_crack(mesh, fine.mesh), "") << path;
       // Midpoints round to float: 1e-7 of each new triangle's size.

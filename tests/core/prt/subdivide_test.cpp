@@ -26,11 +26,13 @@ std::vector<float> ball_field(std::span<const TransferPoint> points) {
   return values;
 }
 
+const ValueSource kBall{2, ball_field};
+
 constexpr std::array kMeasures = {SplitMeasure::residual, SplitMeasure::eq2, SplitMeasure::eq3, SplitMeasure::eq4};
 
 Subdivided refine(const Mesh& mesh, SplitMeasure measure, std::uint64_t budget) {
   Threads threads(1);
-  return subdivide(mesh, 2, ball_field, {.measure = measure, .triangles = budget}, threads);
+  return subdivide(mesh, kBall, {.measure = measure, .triangles = budget}, threads);
 }
 
 TEST(Subdivide, LeavesNoCrackOnRandomMeshesWithSeamsAndNonManifoldEdges) {
@@ -104,15 +106,16 @@ TEST(Subdivide, ValuesAreThoseOfTheSourceAndEachPointIsAskedOnce) {
   const Mesh mesh = testing::column_scene().mesh;
   std::set<std::array<float, 6>> asked;
   std::uint64_t calls = 0;
-  const ValueSource source = [&](std::span<const TransferPoint> points) {
-    for (const TransferPoint& p : points) {
-      asked.insert({p.position.x, p.position.y, p.position.z, p.normal.x, p.normal.y, p.normal.z});
-    }
-    calls += points.size();
-    return ball_field(points);
-  };
+  const ValueSource source{
+      2, [&](std::span<const TransferPoint> points) {
+        for (const TransferPoint& p : points) {
+          asked.insert({p.position.x, p.position.y, p.position.z, p.normal.x, p.normal.y, p.normal.z});
+        }
+        calls += points.size();
+        return ball_field(points);
+      }};
   Threads threads(1);
-  const Subdivided result = subdivide(mesh, 2, source, {.measure = SplitMeasure::eq3, .triangles = 2000}, threads);
+  const Subdivided result = subdivide(mesh, source, {.measure = SplitMeasure::eq3, .triangles = 2000}, threads);
   EXPECT_EQ(result.evaluated, calls);
   // A vertex stands where its position and normal say; the column's seams repeat positions, not pairs.
   EXPECT_EQ(asked.size(), calls);
@@ -121,7 +124,10 @@ TEST(Subdivide, ValuesAreThoseOfTheSourceAndEachPointIsAskedOnce) {
   for (std::size_t v = 0; v < result.mesh.position.size(); ++v) {
     points.push_back({.position = result.mesh.position[v], .normal = result.mesh.normal[v]});
   }
-  EXPECT_EQ(ball_field(points), result.values);
+  const std::vector<float> asked_again = ball_field(points);
+  for (std::size_t i = 0; i < asked_again.size(); ++i) {
+    EXPECT_NEAR(asked_again[i], result.values[i], 0x1p-13);  // rows are kept in 16 bits; the field is below 1
+  }
 }
 
 TEST(Subdivide, InputVerticesKeepTheirPlaces) {
@@ -134,9 +140,9 @@ TEST(Subdivide, AThresholdStopsBeforeTheBudget) {
   const Mesh mesh = testing::column_scene().mesh;
   Threads threads(1);
   Subdivide params{.measure = SplitMeasure::residual, .threshold = 1e9F, .triangles = 5000};
-  EXPECT_EQ(subdivide(mesh, 2, ball_field, params, threads).mesh.triangles.size(), mesh.triangles.size());
+  EXPECT_EQ(subdivide(mesh, kBall, params, threads).mesh.triangles.size(), mesh.triangles.size());
   params.threshold = 1e-3F;
-  const std::size_t some = subdivide(mesh, 2, ball_field, params, threads).mesh.triangles.size();
+  const std::size_t some = subdivide(mesh, kBall, params, threads).mesh.triangles.size();
   EXPECT_GT(some, mesh.triangles.size());
   EXPECT_LT(some, 5000U);
 }
@@ -144,7 +150,7 @@ TEST(Subdivide, AThresholdStopsBeforeTheBudget) {
 TEST(Subdivide, NoTriangleIsSplitDeeperThanAllowed) {
   const Mesh mesh = testing::column_scene().mesh;
   Threads threads(1);
-  const Subdivided result = subdivide(mesh, 2, ball_field, {.triangles = 100000, .max_depth = 2}, threads);
+  const Subdivided result = subdivide(mesh, kBall, {.triangles = 100000, .max_depth = 2}, threads);
   // Every split of a 246-triangle mesh to depth 2, at most.
   EXPECT_LE(result.mesh.triangles.size(), mesh.triangles.size() * 16);
   EXPECT_LE(*std::max_element(result.depth.begin(), result.depth.end()), 2);
@@ -153,9 +159,9 @@ TEST(Subdivide, NoTriangleIsSplitDeeperThanAllowed) {
 TEST(Subdivide, AConstantFieldIsNeverSplit) {
   const Mesh mesh = testing::column_scene().mesh;
   Threads threads(1);
-  const ValueSource constant = [](std::span<const TransferPoint> p) { return std::vector<float>(p.size(), 0.7F); };
+  const ValueSource constant{1, [](std::span<const TransferPoint> p) { return std::vector<float>(p.size(), 0.7F); }};
   for (const SplitMeasure measure : kMeasures) {
-    const Subdivided result = subdivide(mesh, 1, constant, {.measure = measure, .triangles = 9999}, threads);
+    const Subdivided result = subdivide(mesh, constant, {.measure = measure, .triangles = 9999}, threads);
     EXPECT_EQ(result.mesh.triangles, mesh.triangles);
   }
 }
@@ -185,7 +191,7 @@ TEST(Subdivide, TheSameMeshForAnyThreadCount) {
   const Mesh mesh = testing::knot_scene().mesh;
   Threads one(1), two(2);
   const Subdivide params{.triangles = 5000};
-  const Subdivided a = subdivide(mesh, 2, ball_field, params, one), b = subdivide(mesh, 2, ball_field, params, two);
+  const Subdivided a = subdivide(mesh, kBall, params, one), b = subdivide(mesh, kBall, params, two);
   EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
   EXPECT_EQ(a.values, b.values);
 }
