@@ -49,8 +49,9 @@ class TreeCheck {
   }
 
  private:
-  bool expect(bool holds, const std::string& what, const std::string& place) {
-    if (!holds) findings_.fail("json_type", "The value must be " + what + ".", place.empty() ? "/" : place);
+  bool expect(bool holds, std::string_view what, const std::string& place) {
+    if (!holds)
+      findings_.fail("json_type", "The value must be " + std::string(what) + ".", place.empty() ? "/" : place);
     return holds;
   }
 
@@ -84,7 +85,7 @@ class TreeCheck {
       case Is::word:
         return word(value, m, place);
       case Is::real:
-        return real(value, place);
+        return real(value, kMaxReal, place, place);
       case Is::whole:
       case Is::small_whole:
       case Is::value_whole:
@@ -112,8 +113,11 @@ class TreeCheck {
     findings_.fail("unknown_enum", "The value of \"" + std::string(m.name) + "\" is not one that glTF knows.", place);
   }
 
-  void real(const Json& value, const std::string& place) {
-    if (expect(value.is_number(), "a number", place) && std::abs(value.get<double>()) > kMaxReal) too_large(place);
+  /// Written with a point from here on: in an extension tinygltf narrows all others to int.
+  void real(Json& value, double limit, const std::string& place, const std::string& large_place) {
+    if (!expect(value.is_number(), "a number", place)) return;
+    value = value.get<double>();
+    if (std::abs(value.get<double>()) > limit) too_large(large_place);
   }
 
   void too_large(const std::string& place) { findings_.fail("number_out_of_range", "The number is too large.", place); }
@@ -156,15 +160,13 @@ class TreeCheck {
     }
   }
 
-  void numbers(const Json& value, const Member& m, const std::string& place) {
-    if (!expect(value.is_array() && value.size() == m.count, "an array of " + std::to_string(m.count) + " numbers",
-                place)) {
+  void numbers(Json& value, const Member& m, const std::string& place) {
+    if (!value.is_array() || value.size() != m.count) {
+      expect(false, "an array of " + std::to_string(m.count) + " numbers", place);
       return;
     }
-    for (std::size_t i = 0; i < value.size(); ++i) {
-      if (!expect(value[i].is_number(), "a number", place + "/" + std::to_string(i))) return;
-      if (m.is == Is::reals && std::abs(value[i].get<double>()) > kMaxReal) too_large(place);
-    }
+    const double limit = m.is == Is::reals ? kMaxReal : std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < value.size(); ++i) real(value[i], limit, place + "/" + std::to_string(i), place);
   }
 
   void bounds(Json& value, const std::string& place) {

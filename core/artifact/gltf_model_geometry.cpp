@@ -170,10 +170,10 @@ Node convert_node(const tinygltf::Node& node, const std::string& place, Findings
 
 /// Nodes of the default scene; of scene 0 if none is named; without scenes all nodes that are nobody's children.
 std::vector<int> roots_of(const tinygltf::Model& model) {
-  if (!model.scenes.empty()) return model.scenes[static_cast<std::size_t>(std::max(0, model.defaultScene))].nodes;
+  if (!model.scenes.empty()) return model.scenes.at(static_cast<std::size_t>(std::max(0, model.defaultScene))).nodes;
   std::vector<bool> is_child(model.nodes.size());
   for (const auto& node : model.nodes) {
-    for (const int child : node.children) is_child[static_cast<std::size_t>(child)] = true;
+    for (const int child : node.children) is_child.at(static_cast<std::size_t>(child)) = true;
   }
   std::vector<int> nodes;
   for (std::size_t i = 0; i < is_child.size(); ++i) {

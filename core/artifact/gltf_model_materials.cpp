@@ -68,7 +68,7 @@ TextureRef texture_info_of(const Value& object, const char* name, const std::str
 
 void set_metallic_roughness(const tinygltf::PbrMetallicRoughness& pbr, const std::string& place, Material& m,
                             Findings& findings) {
-  const auto c = [&](std::size_t i) { return static_cast<float>(pbr.baseColorFactor[i]); };
+  const auto c = [&](std::size_t i) { return static_cast<float>(pbr.baseColorFactor.at(i)); };
   m.base_color = {c(0), c(1), c(2), c(3)};
   m.base_color_texture = convert_texture_info(pbr.baseColorTexture, place + "/baseColorTexture", findings);
   m.metallic = static_cast<float>(pbr.metallicFactor);
@@ -140,7 +140,7 @@ Texture convert_texture(const tinygltf::Model& model, const tinygltf::Texture& t
                         Findings& findings) {
   Texture out;
   if (texture.sampler >= 0) {
-    const auto& sampler = model.samplers[static_cast<std::size_t>(texture.sampler)];
+    const auto& sampler = model.samplers.at(static_cast<std::size_t>(texture.sampler));
     out.wrap_u = convert_wrap(sampler.wrapS);
     out.wrap_v = convert_wrap(sampler.wrapT);
     out.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;

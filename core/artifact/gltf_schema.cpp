@@ -190,6 +190,7 @@ constexpr Kind kRootExtensions{kRootExtensionMembers};
 constexpr Member kAssetMembers[] = {required(plain("version", Is::text))};
 constexpr Kind kAsset{kAssetMembers};
 
+/// Arrays that others refer to come first: where one is no array, that is the fault to tell.
 constexpr Member kRootMembers[] = {
     required(object("asset", kAsset)),
     plain("extensionsUsed", Is::texts),
@@ -197,14 +198,14 @@ constexpr Member kRootMembers[] = {
     objects("buffers", kBuffer),
     objects("bufferViews", kView),
     objects("accessors", kAccessor),
-    objects("meshes", kMesh),
-    objects("nodes", kNode),
-    plain("skins", Is::list),
     objects("images", kImage),
     objects("samplers", kSampler),
     objects("textures", kTexture),
     objects("materials", kMaterial),
+    objects("meshes", kMesh),
+    plain("skins", Is::list),
     object("extensions", kRootExtensions),
+    objects("nodes", kNode),
     objects("scenes", kScene),
     index("scene", "scenes"),
 };

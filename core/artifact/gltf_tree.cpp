@@ -91,7 +91,7 @@ std::vector<ImageSource> take_images(Json& root, Findings& findings) {
 }
 
 void set_aside(Json& object, const char* name) {
-  object["extensions"][kSetAside][name] = object[name];
+  object["extensions"][kSetAside][name] = object[name].get<double>();
   object.erase(name);
 }
 
