@@ -50,9 +50,9 @@ class TreeCheck {
 
  private:
   bool expect(bool holds, std::string_view what, const std::string& place) {
-    if (!holds)
-      findings_.fail("json_type", "The value must be " + std::string(what) + ".", place.empty() ? "/" : place);
-    return holds;
+    if (holds) return true;
+    findings_.fail("json_type", "The value must be " + std::string(what) + ".", place.empty() ? "/" : place);
+    return false;
   }
 
   /// tinygltf's structs are up to 184 times as long as the JSON "{}" that makes one.
@@ -129,7 +129,7 @@ class TreeCheck {
       findings_.fail("unknown_enum", "The value of \"" + std::string(m.name) + "\" is not one that glTF knows.", place);
     }
     if (m.is == Is::small_whole && x > kMaxInt) too_large(place);
-    if (m.is == Is::value_whole && x > kMaxInt) {
+    if (m.is == Is::value_whole) {
       value = x;
     } else {
       value = static_cast<std::uint64_t>(x);

@@ -15,7 +15,7 @@ enum class Is {
   real,         // a number of at most 1e30 in size: a float holds it
   whole,        // 0 .. 2^53
   small_whole,  // 0 .. 2^31 - 1: tinygltf holds it as int
-  value_whole,  // 0 .. 2^53, in an extension: tinygltf holds it as int unless it is written with a point
+  value_whole,  // 0 .. 2^53, in an extension: to be written with a point, or tinygltf narrows it to int
   code,         // one of `codes`
   index,        // below the size of the root's array `of`
   indices,      // an array of such
