@@ -1,5 +1,7 @@
 #include "core/artifact/gltf_schema.h"
 
+#include <tiny_gltf.h>
+
 namespace kiln::gltf {
 namespace {
 
@@ -37,6 +39,10 @@ constexpr Member required(Member member) {
 /// An extension's members become values in maps, and tinygltf keeps those of materials twice.
 constexpr std::size_t values(std::size_t count) { return (count + 1) * kNamedValueBytes; }
 
+/// One in a vector that has doubled, with its short strings and arrays.
+template <class T>
+constexpr std::size_t kHeld = 2 * sizeof(T) + 128;
+
 constexpr int kComponents[] = {5120, 5121, 5122, 5123, 5125, 5126}, kModes[] = {0, 1, 2, 3, 4, 5, 6},
               kWraps[] = {10497, 33071, 33648};
 constexpr std::string_view kTypes[] = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"},
@@ -68,7 +74,7 @@ constexpr Kind kViewExtensions{kViewExtensionMembers};
 constexpr Member kViewMembers[] = {required(index("buffer", "buffers")), plain("byteOffset", Is::whole),
                                    required(plain("byteLength", Is::whole)), plain("byteStride", Is::whole),
                                    object("extensions", kViewExtensions)};
-constexpr Kind kView{kViewMembers, 700};
+constexpr Kind kView{kViewMembers, kHeld<tinygltf::BufferView>};
 
 constexpr Member kSparseIndicesMembers[] = {required(index("bufferView", "bufferViews")),
                                             plain("byteOffset", Is::small_whole),
@@ -90,7 +96,7 @@ constexpr Member kAccessorMembers[] = {index("bufferView", "bufferViews"),
                                        object("sparse", kSparse),
                                        plain("min", Is::bounds),
                                        plain("max", Is::bounds)};
-constexpr Kind kAccessor{kAccessorMembers, 1000};
+constexpr Kind kAccessor{kAccessorMembers, kHeld<tinygltf::Accessor>};
 
 // Meshes, nodes, scenes.
 
@@ -99,16 +105,16 @@ constexpr Kind kDraco{kDracoMembers, values(2)};
 constexpr Member kPrimitiveExtensionMembers[] = {object("KHR_draco_mesh_compression", kDraco)};
 constexpr Kind kPrimitiveExtensions{kPrimitiveExtensionMembers};
 constexpr Member kTargetMembers[] = {index("POSITION", "accessors")};
-constexpr Kind kTarget{kTargetMembers, 256};
+constexpr Kind kTarget{kTargetMembers, kHeld<std::map<std::string, int>>};
 constexpr Member kPrimitiveMembers[] = {required(index_map("attributes", "accessors")),
                                         index("indices", "accessors"),
                                         index("material", "materials"),
                                         code("mode", kModes),
                                         objects("targets", kTarget),
                                         object("extensions", kPrimitiveExtensions)};
-constexpr Kind kPrimitive{kPrimitiveMembers, 800};
+constexpr Kind kPrimitive{kPrimitiveMembers, kHeld<tinygltf::Primitive>};
 constexpr Member kMeshMembers[] = {plain("name", Is::text), required(objects("primitives", kPrimitive))};
-constexpr Kind kMesh{kMeshMembers, 800};
+constexpr Kind kMesh{kMeshMembers, kHeld<tinygltf::Mesh>};
 
 constexpr Member kNodeLightMembers[] = {index("light", "lights")};
 constexpr Kind kNodeLight{kNodeLightMembers, values(1)};
@@ -121,9 +127,9 @@ constexpr Member kNodeMembers[] = {
     plain("name", Is::text), indices("children", "nodes"), index("mesh", "meshes"),
     index("skin", "skins"),  numbers("matrix", 16),        numbers("translation", 3),
     numbers("rotation", 4),  numbers("scale", 3),          object("extensions", kNodeExtensions)};
-constexpr Kind kNode{kNodeMembers, 1000};
+constexpr Kind kNode{kNodeMembers, kHeld<tinygltf::Node>};
 constexpr Member kSceneMembers[] = {indices("nodes", "nodes")};
-constexpr Kind kScene{kSceneMembers, 700};
+constexpr Kind kScene{kSceneMembers, kHeld<tinygltf::Scene>};
 
 // Images, textures, materials, lights.
 
@@ -132,7 +138,7 @@ constexpr Member kImageMembers[] = {plain("name", Is::text), plain("uri", Is::te
 constexpr Kind kImage{kImageMembers};
 constexpr Member kSamplerMembers[] = {code("wrapS", kWraps), code("wrapT", kWraps),
                                       plain("magFilter", Is::small_whole)};
-constexpr Kind kSampler{kSamplerMembers, 700};
+constexpr Kind kSampler{kSamplerMembers, kHeld<tinygltf::Sampler>};
 constexpr Member kOtherSourceMembers[] = {index("source", "images")};
 constexpr Kind kOtherSource{kOtherSourceMembers, values(1)};
 constexpr Member kTextureExtensionMembers[] = {
@@ -141,7 +147,7 @@ constexpr Member kTextureExtensionMembers[] = {
 constexpr Kind kTextureExtensions{kTextureExtensionMembers};
 constexpr Member kTextureMembers[] = {index("sampler", "samplers"), index("source", "images"),
                                       object("extensions", kTextureExtensions)};
-constexpr Kind kTexture{kTextureMembers, 700};
+constexpr Kind kTexture{kTextureMembers, kHeld<tinygltf::Texture>};
 
 constexpr Member kTransformMembers[] = {reals("offset", 2), reals("scale", 2), plain("rotation", Is::real),
                                         plain("texCoord", Is::small_whole)};
@@ -174,14 +180,14 @@ constexpr Member kMaterialMembers[] = {plain("name", Is::text),
                                        plain("alphaCutoff", Is::real),
                                        plain("doubleSided", Is::flag),
                                        object("extensions", kMaterialExtensions)};
-constexpr Kind kMaterial{kMaterialMembers, 4400 + values(8)};
+constexpr Kind kMaterial{kMaterialMembers, kHeld<tinygltf::Material> + values(8)};
 
 constexpr Member kSpotMembers[] = {plain("innerConeAngle", Is::real), plain("outerConeAngle", Is::real)};
 constexpr Kind kSpot{kSpotMembers};
 constexpr Member kLightMembers[] = {plain("name", Is::text),  required(word("type", kLightTypes)),
                                     reals("color", 3),        plain("intensity", Is::real),
                                     plain("range", Is::real), object("spot", kSpot)};
-constexpr Kind kLight{kLightMembers, 1400 + 3 * values(8)};
+constexpr Kind kLight{kLightMembers, kHeld<tinygltf::Light> + 3 * values(8)};
 constexpr Member kLightsMembers[] = {objects("lights", kLight)};
 constexpr Kind kLights{kLightsMembers};
 constexpr Member kRootExtensionMembers[] = {object("KHR_lights_punctual", kLights)};
