@@ -3,6 +3,7 @@
 kiln_library(kiln_tinygltf SOURCES tinygltf.cpp PRIVATE_LINKS nlohmann_json::nlohmann_json)
 target_compile_definitions(kiln_tinygltf PUBLIC tinygltf=kiln_tinygltf TINYGLTF_NO_FS TINYGLTF_NO_EXTERNAL_IMAGE
                                                 TINYGLTF_NO_STB_IMAGE TINYGLTF_NO_STB_IMAGE_WRITE)
+target_compile_options(kiln_tinygltf PRIVATE -O1 -g0)  # a third of the time and memory to compile under the sanitizers
 target_include_directories(kiln_tinygltf SYSTEM PUBLIC ${TINYGLTF_INCLUDE_DIR})
 kiln_library(kiln_import
   SOURCES findings.cpp uri.cpp json_scan.cpp json_fields.cpp
