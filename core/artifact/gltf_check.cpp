@@ -1,6 +1,6 @@
 #include "core/artifact/gltf_check.h"
 
-#include <array>
+#include <algorithm>
 #include <string_view>
 
 namespace kiln::gltf {
@@ -10,6 +10,44 @@ namespace {
 constexpr std::uint64_t kMaxZeroElements = 8u << 20;
 
 std::string accessor_place(std::size_t i) { return "/accessors/" + std::to_string(i); }
+
+/// An index that may be absent, and one that may not.
+bool may(int index, const auto& array) { return index >= -1 && index < static_cast<int>(array.size()); }
+bool must(int index, const auto& array) { return index >= 0 && may(index, array); }
+
+bool all(const std::vector<int>& indices, const auto& array) {
+  return std::all_of(indices.begin(), indices.end(), [&](int i) { return must(i, array); });
+}
+bool all(const std::map<std::string, int>& indices, const auto& array) {
+  return std::all_of(indices.begin(), indices.end(), [&](const auto& named) { return must(named.second, array); });
+}
+
+bool holds(const Document& d, const BufferView& v) {
+  return must(v.buffer, d.buffers) && (v.meshopt.mode == MeshoptMode::none || must(v.meshopt.buffer, d.buffers));
+}
+bool holds(const Document& d, const Accessor& a) {
+  return may(a.view, d.views) && a.width > 0 &&
+         (a.sparse.count == 0 || (must(a.sparse.index_view, d.views) && must(a.sparse.value_view, d.views)));
+}
+bool holds(const Document& d, const Mesh& m) {
+  return std::all_of(m.primitives.begin(), m.primitives.end(), [&](const Primitive& p) {
+    return all(p.attributes, d.accessors) && may(p.indices, d.accessors) && may(p.material, d.materials) &&
+           may(p.draco.view, d.views);
+  });
+}
+bool holds(const Document& d, const Node& n) {
+  return all(n.children, d.nodes) && may(n.mesh, d.meshes) && may(n.light, d.lights) && all(n.instancing, d.accessors);
+}
+bool holds(const Document& d, const ImageSource& i) { return may(i.view, d.views); }
+bool holds(const Document& d, const Texture& t) { return may(t.image, d.images); }
+bool holds(const Document& d, const Material& m) {
+  return may(m.base_color_texture.texture, d.textures) && may(m.emission_texture.texture, d.textures) &&
+         may(m.normal_texture.texture, d.textures) && may(m.metallic_roughness_texture.texture, d.textures);
+}
+
+bool all_hold(const Document& d, const auto& array) {
+  return std::all_of(array.begin(), array.end(), [&](const auto& element) { return holds(d, element); });
+}
 
 /// offset + stride * (count - 1) + element <= view, without overflow: all terms are below 2^53 or checked first.
 void check_range(const Document& d, int view, std::uint64_t offset, std::uint64_t stride, std::uint64_t count,
@@ -122,6 +160,11 @@ void check_forest(const Document& d, Findings& findings) {
 std::uint64_t stride_of(const Accessor& a, const Document& d) {
   const std::uint64_t stride = a.view >= 0 ? d.views[static_cast<std::size_t>(a.view)].stride : 0;
   return stride > 0 ? stride : a.element_bytes();
+}
+
+bool indices_hold(const Document& d) {
+  return all_hold(d, d.views) && all_hold(d, d.accessors) && all_hold(d, d.meshes) && all_hold(d, d.nodes) &&
+         all_hold(d, d.images) && all_hold(d, d.textures) && all_hold(d, d.materials) && all(d.roots, d.nodes);
 }
 
 void check_document(const Document& d, Findings& findings) {

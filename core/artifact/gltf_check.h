@@ -8,6 +8,10 @@ namespace kiln::gltf {
 
 inline constexpr int kMaxNodeDepth = 1024;
 
+/// Whether every index is below the size of what it refers to, or -1 where it may be absent. check_tree says which one
+/// is not, in the file; this is asked behind tinygltf, so that safety does not hang on what a library makes of numbers.
+bool indices_hold(const Document&);
+
 /// After this, reading any accessor of the document stays inside its views. Never recurses.
 void check_document(const Document&, Findings&);
 

@@ -5,7 +5,7 @@
 #include "core/artifact/assemble.h"
 #include "core/artifact/gltf_check.h"
 #include "core/artifact/gltf_images.h"
-#include "core/artifact/gltf_parse.h"
+#include "core/artifact/gltf_load.h"
 #include "core/artifact/gltf_placement.h"
 #include "core/artifact/gltf_primitive.h"
 #include "core/artifact/json_scan.h"
@@ -158,7 +158,7 @@ Scene import_gltf(const GltfContainer& container, const SceneFiles& files, const
             {.max_bytes = limits.max_json_bytes, .max_depth = limits.max_json_depth, .max_objects = limits.max_objects},
             findings);
   if (findings.failed()) return scene;
-  const Document document = parse_document(container.json, findings);
+  const Document document = load_document(container.json, findings);
   if (findings.failed()) return scene;
   const BufferBytes bytes = load_bytes(document, container, files, limits, findings);
   if (!findings.failed()) check_document(document, findings);

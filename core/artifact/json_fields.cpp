@@ -11,14 +11,13 @@ const nlohmann::json& empty_object() {
   return empty;
 }
 
-/// A whole number in 0 .. 2^53, also when written as 3.0; -1 for anything else.
-double whole(const nlohmann::json& value) {
+}  // namespace
+
+double whole_number(const nlohmann::json& value) {
   if (!value.is_number()) return -1;
   const auto x = value.get<double>();
   return x >= 0 && x <= 0x1p53 && x == std::floor(x) ? x : -1;
 }
-
-}  // namespace
 
 Fields::Fields(const nlohmann::json& json, std::string pointer, Findings& findings)
     : json_(&json), pointer_(std::move(pointer)), findings_(&findings) {
@@ -65,14 +64,14 @@ std::string Fields::text(const char* key) const {
 std::uint64_t Fields::count(const char* key, std::uint64_t absent) const {
   const auto* value = find(key);
   if (!value) return absent;
-  const double x = whole(*value);
+  const double x = whole_number(*value);
   if (x >= 0) return static_cast<std::uint64_t>(x);
   wrong_type(pointer(key), "a whole number that is not negative");
   return absent;
 }
 
 int Fields::as_index(const nlohmann::json& value, const std::string& place, std::size_t size) const {
-  const double x = whole(value);
+  const double x = whole_number(value);
   if (x >= 0 && x < static_cast<double>(size)) return static_cast<int>(x);
   if (x < 0) {
     wrong_type(place, "an index");

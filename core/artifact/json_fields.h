@@ -13,6 +13,9 @@
 
 namespace kiln {
 
+/// A whole number in 0 .. 2^53, also when written as 3.0; -1 for anything else.
+double whole_number(const nlohmann::json&);
+
 /// A view of an object; `json` must outlive it. Absent members give the default.
 class Fields {
  public:

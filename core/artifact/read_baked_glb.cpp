@@ -9,7 +9,7 @@
 #include "core/artifact/gltf_bytes.h"
 #include "core/artifact/gltf_check.h"
 #include "core/artifact/gltf_container.h"
-#include "core/artifact/gltf_parse.h"
+#include "core/artifact/gltf_load.h"
 #include "core/artifact/image_decode.h"
 #include "core/artifact/json_scan.h"
 
@@ -259,7 +259,7 @@ BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   if (findings.failed()) return {};
   const BakedHeader header = read_baked_header(container.json, findings);
   if (findings.failed()) return {};
-  const gltf::Document document = gltf::parse_document(container.json, findings);
+  const gltf::Document document = gltf::load_document(container.json, findings);
   if (!findings.failed()) gltf::check_document(document, findings);
   if (!findings.failed()) check_shape(document, header, findings);
   if (findings.failed()) return {};

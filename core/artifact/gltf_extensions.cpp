@@ -2,7 +2,7 @@
 #include <array>
 #include <string_view>
 
-#include "core/artifact/gltf_parse_parts.h"
+#include "core/artifact/gltf_tree.h"
 
 namespace kiln::gltf {
 namespace {
@@ -31,18 +31,14 @@ std::string printable(const std::string& name) {
 
 }  // namespace
 
-void check_extensions(const Fields& root, Document& document) {
-  Findings& findings = root.findings();
-  int i = 0;
-  for (const std::string& name : root.texts("extensionsRequired")) {
-    if (!contains(kHonoured, name) && !contains(kHarmless, name)) {
-      findings.fail("unsupported_extension", "The file requires " + printable(name) + ", which is not supported.",
-                    "/extensionsRequired/" + std::to_string(i));
-    }
-    ++i;
+void check_extensions(const std::vector<std::string>& used, const std::vector<std::string>& required,
+                      Findings& findings) {
+  for (std::size_t i = 0; i < required.size(); ++i) {
+    if (contains(kHonoured, required[i]) || contains(kHarmless, required[i])) continue;
+    findings.fail("unsupported_extension", "The file requires " + printable(required[i]) + ", which is not supported.",
+                  "/extensionsRequired/" + std::to_string(i));
   }
-  for (const std::string& name : root.texts("extensionsUsed")) {
-    if (name == "KHR_mesh_quantization") document.declares_quantization = true;
+  for (const std::string& name : used) {
     if (name == "KHR_materials_pbrSpecularGlossiness") {
       findings.warn("specular_glossiness_as_diffuse",
                     "Specular-glossiness materials are baked by their diffuse colour.");

@@ -1,5 +1,5 @@
 #pragma once
-// JSON text to a gltf::Document.
+// JSON text to a gltf::Document, through tinygltf.
 
 #include <cstdint>
 #include <span>
@@ -11,6 +11,6 @@ namespace kiln::gltf {
 
 /// Reads text that has passed scan_json. Fails on wrong types, indices out of range, unknown enums, another version
 /// than 2.x and required extensions that Kiln does not know. Warns of used ones that it ignores.
-Document parse_document(std::span<const std::uint8_t> json, Findings&);
+Document load_document(std::span<const std::uint8_t> json, Findings&);
 
 }  // namespace kiln::gltf
