@@ -19,7 +19,7 @@ while IFS='|' read -r folder own foreign; do
         *) allowed=yes ;;
       esac
       [[ $name == sys/* || $name == linux/* || $name == netinet/* || $name == arpa/* ]] && allowed=yes
-      [[ $name =~ ^(unistd|fcntl|signal|poll|spawn|dirent|errno|netdb|pwd|termios|sched|time|stdlib|immintrin|emmintrin)\.h$ ]] && allowed=yes
+      [[ $name =~ ^(unistd|fcntl|signal|poll|spawn|dirent|errno|netdb|pthread|pwd|termios|sched|time|stdlib|immintrin|emmintrin)\.h$ ]] && allowed=yes
       for library in $foreign; do
         [[ $name == "$library"* ]] && { [[ $file == *.cpp ]] || [[ $library == tl ]] || [[ $name == nlohmann/json_fwd.hpp ]]; } && allowed=yes
         [[ $library == stb && $name == stb_* && $file == *.cpp ]] && allowed=yes
