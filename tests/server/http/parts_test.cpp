@@ -1,11 +1,10 @@
-// The pieces below the routes: heads, escapes, forms, the path table.
+// The pieces below the routes: heads, escapes, forms.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "core/base/random.h"
-#include "server/http/httplib_server.h"
 #include "server/http/multipart.h"
 #include "server/http/parse_head.h"
 
@@ -138,69 +137,6 @@ TEST(Multipart, NeedsABoundary) {
   for (const char* type : {"multipart/form-data", "multipart/form-data; boundary=", "multipart/form-data; boundary=\"",
                            "multipart/form-data; boundary=\"a b\""})
     EXPECT_FALSE(MultipartReader::open(form_head(type), body).has_value()) << type;
-}
-
-class Collected : public Sink {
- public:
-  bool write(std::string_view bytes) override {
-    text.append(bytes);
-    return true;
-  }
-  bool client_gone() override { return false; }
-  std::string text;
-};
-
-Handlers handlers_of_all() {
-  Handlers handlers;
-  for (const Endpoint& endpoint : endpoints())
-    handlers[std::string(endpoint.operation)] = [](Request&) { return json_reply(200, "{}"); };
-  return handlers;
-}
-
-/// "/v1/jobs/x%2Fy" of "/v1/jobs/{id}"; every parameter has that value.
-std::string filled(std::string_view pattern) {
-  std::string path(pattern);
-  for (std::size_t at = path.find('{'); at != std::string::npos; at = path.find('{'))
-    path.replace(at, path.find('}') - at + 1, "x%20y");
-  return path;
-}
-
-TEST(HttplibServer, HasAHandlerForEveryEndpointOrDoesNotStart) {
-  EXPECT_ANY_THROW(HttplibServer({}, {}, {}));
-  Handlers one_is_unknown = handlers_of_all();
-  one_is_unknown.erase("getJob");
-  one_is_unknown["getJobs"] = [](Request&) { return Reply{}; };
-  EXPECT_ANY_THROW(HttplibServer(one_is_unknown, {}, {}));
-}
-
-TEST(HttplibServer, LeadsEveryMethodAndPathOfTheTableToItsHandler) {
-  const Endpoint* found = nullptr;
-  std::vector<std::pair<std::string, std::string>> params;
-  const HttplibServer server(handlers_of_all(), {},
-                             [&](const Endpoint* endpoint, const Handler& handler, Request& request) {
-                               found = endpoint;
-                               params = request.path_params;
-                               return handler(request);
-                             });
-  for (const Endpoint& endpoint : endpoints())
-    for (const std::string_view method : {endpoint.method, std::string_view("HEAD"), std::string_view("PATCH")}) {
-      SCOPED_TRACE(std::string(method) + " " + std::string(endpoint.path));
-      auto head = parse_head(std::string(method) + " " + filled(endpoint.path) + "?a=b?c HTTP/1.1\r\nHost: h\r\n\r\n");
-      ASSERT_TRUE(head.has_value());
-      Collected client;
-      Request request;
-      request.head = *head;
-      request.client = &client;
-      found = nullptr;
-      const Outcome outcome = server.serve(request);
-      const bool answers = method == endpoint.method || (method == "HEAD" && endpoint.method == "GET");
-      if (!answers && method == "HEAD") continue;  // another endpoint's
-      EXPECT_EQ(outcome.status, answers ? 200 : 405) << client.text;
-      EXPECT_EQ(found, answers ? &endpoint : nullptr);
-      EXPECT_EQ(outcome.operation, answers ? endpoint.operation : "none");
-      for (const auto& [name, value] : params) EXPECT_EQ(value, "x y") << name;
-      EXPECT_EQ(params.size(), static_cast<std::size_t>(std::ranges::count(endpoint.path, '{')));
-    }
 }
 
 }  // namespace
