@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/expects.h"
+#include "server/http/route_pattern.h"
 
 namespace kiln {
 namespace {
@@ -168,50 +169,6 @@ void answer_exception(const httplib::Request& in, httplib::Response& out, const 
   put_reply(visit, problem_reply(generic), out);
 }
 
-/// "/v1/jobs/([^/]+)" of "/v1/jobs/{id}", and the names in braces.
-struct Pattern {
-  std::string regex;
-  std::vector<std::string> names;
-};
-
-Pattern pattern_of(std::string_view path) {
-  Pattern pattern;
-  while (!path.empty()) {
-    const std::size_t end = path.front() == '{' ? path.find('}') + 1 : 1;
-    if (path.front() == '{') pattern.names.emplace_back(path.substr(1, end - 2));
-    pattern.regex += path.front() == '{' ? "([^/]+)" : path.front() == '.' ? "\\." : std::string(path.substr(0, 1));
-    path.remove_prefix(end);
-  }
-  return pattern;
-}
-
-std::string allowed_methods(std::string_view path) {
-  std::string list;
-  for (const Endpoint& endpoint : endpoints()) {
-    if (endpoint.path != path) continue;
-    if (!list.empty()) list += ", ";
-    list += endpoint.method == "GET" ? "GET, HEAD" : std::string(endpoint.method);
-  }
-  return list;
-}
-
-Handler method_not_allowed(const std::string& allow) {
-  return [allow](Request&) {
-    Reply reply = problem_reply(make_problem("method_not_allowed", "this address takes " + allow));
-    reply.fields.push_back({"allow", allow});
-    return reply;
-  };
-}
-
-Handler list_methods(const std::string& allow) {
-  return [allow](Request&) {
-    Reply reply;
-    reply.status = 204;
-    reply.fields.push_back({"allow", allow + ", OPTIONS"});
-    return reply;
-  };
-}
-
 /// The library without its listening part.
 class Library : public httplib::Server {
  public:
@@ -259,7 +216,7 @@ struct HttplibServer::State {
     Handler handler;
   };
 
-  void add(std::string_view method, const Pattern& pattern, const Target& target) {
+  void add(std::string_view method, const RoutePattern& pattern, const Target& target) {
     const Verb& verb = *std::ranges::find(kVerbs, method, &Verb::name);
     (library.*verb.add)(pattern.regex, [this, names = pattern.names, target](const auto& in, auto& out) {
       Visit& visit = visit_of(in);
@@ -273,10 +230,10 @@ struct HttplibServer::State {
 
   void add_refusals(std::string_view path) {
     const std::string allow = allowed_methods(path);
-    const Pattern pattern = pattern_of(path);
     for (const Verb& verb : kVerbs)
       if (allow.find(verb.name) == std::string::npos)
-        add(verb.name, pattern, {nullptr, verb.name == "OPTIONS" ? list_methods(allow) : method_not_allowed(allow)});
+        add(verb.name, pattern_of(path),
+            {nullptr, verb.name == "OPTIONS" ? list_methods(allow) : method_not_allowed(allow)});
   }
 };
 
