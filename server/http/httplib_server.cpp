@@ -217,8 +217,9 @@ struct HttplibServer::State {
   };
 
   void add(std::string_view method, const RoutePattern& pattern, const Target& target) {
-    const Verb& verb = *std::ranges::find(kVerbs, method, &Verb::name);
-    (library.*verb.add)(pattern.regex, [this, names = pattern.names, target](const auto& in, auto& out) {
+    const auto verb = std::ranges::find(kVerbs, method, &Verb::name);
+    EXPECTS(verb != kVerbs.end());
+    (library.*verb->add)(pattern.regex, [this, names = pattern.names, target](const auto& in, auto& out) {
       Visit& visit = visit_of(in);
       Request& request = *visit.request;
       EXPECTS(in.path == request.head.path);  // two readers, one meaning
