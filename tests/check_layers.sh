@@ -27,7 +27,7 @@ find core server client_cli web_viewer -path web_viewer/node_modules -prune -o \
     function of_the_system(name) {
       if (name !~ /\// && name !~ /\.h(pp)?$/) return 1
       if (name ~ /^(sys|linux|netinet|arpa)\//) return 1
-      return name ~ /^(unistd|fcntl|signal|poll|spawn|dirent|errno|netdb|pwd|termios|sched|time|stdlib|malloc|immintrin|emmintrin)\.h$/
+      return name ~ /^(unistd|fcntl|signal|poll|spawn|dirent|errno|netdb|pwd|termios|sched|time|stdlib|malloc|pthread|immintrin|emmintrin)\.h$/
     }
     function of_a_library(folder, name, file,    library, i, n) {
       n = split(foreign[folder], library, " ")

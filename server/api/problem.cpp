@@ -41,6 +41,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"internal", 500},
     {"store_failed", 500},
     {"io_failed", 500},
+    {"not_implemented", 501},
     {"overloaded", 503},
     {"draining", 503},
     {"not_ready", 503},

@@ -9,7 +9,6 @@
 
 #include "server/http/auth.h"
 #include "server/http/parse_head.h"
-#include "server/http/write_reply.h"
 
 namespace kiln {
 namespace {
@@ -36,26 +35,22 @@ std::string_view without_scheme(std::string_view origin) {
 }
 
 /// What probes ask without a token: whether we live, and which version.
-bool is_open_to_all(const RouteMatch& match) {
-  if (match.endpoint == nullptr) return false;
-  const std::string_view name = match.endpoint->operation;
+bool is_open_to_all(const Endpoint* endpoint) {
+  if (endpoint == nullptr) return false;
+  const std::string_view name = endpoint->operation;
   return name == "health" || name == "readiness" || name == "version";
 }
 
-Reply not_found() { return problem_reply(make_problem("not_found", "there is nothing at this address")); }
-
-Reply method_not_allowed(const RouteMatch& match) {
-  Reply reply = problem_reply(make_problem("method_not_allowed", "this address takes " + match.allow));
-  reply.fields.push_back({"allow", match.allow});
-  return reply;
-}
-
-Reply options_reply(const RouteMatch& match) {
-  Reply reply;
-  reply.status = 204;
-  reply.fields.push_back({"allow", match.allow + ", OPTIONS"});
-  return reply;
-}
+/// Bytes for a connection that has no worker.
+class TextSink : public Sink {
+ public:
+  bool write(std::string_view bytes) override {
+    text.append(bytes);
+    return true;
+  }
+  bool client_gone() override { return false; }
+  std::string text;
+};
 
 /// Puts the request id into a problem that a handler made without knowing it.
 void stamp(Reply& reply, const std::string& id) {
@@ -86,14 +81,17 @@ std::string request_id_of(std::string_view given) {
   return id;
 }
 
-Exchange::Exchange(ExchangeRules rules, Router router, std::function<std::optional<Reply>(Request&)> fallback,
-                   Gate& uploads, HttpMetrics& metrics, LogLine log)
+Exchange::Exchange(ExchangeRules rules, const Handlers& handlers, const Handler& elsewhere, Gate& uploads,
+                   HttpMetrics& metrics, LogLine log)
     : rules_(std::move(rules)),
-      router_(std::move(router)),
-      fallback_(std::move(fallback)),
       uploads_(uploads),
       metrics_(metrics),
-      log_(std::move(log)) {}
+      log_(std::move(log)),
+      library_(handlers, elsewhere, [this](const Endpoint* endpoint, const Handler& handler, Request& request) {
+        Reply reply = dispatch(endpoint, handler, request);
+        stamp(reply, request.id);
+        return reply;
+      }) {}
 
 /// A browser page of another origin may not change anything here, nor reach us under another name (DNS rebinding).
 Answer<void> Exchange::check_origin(const Head& head) const {
@@ -110,15 +108,15 @@ Answer<void> Exchange::check_origin(const Head& head) const {
   return {};
 }
 
-Answer<void> Exchange::check(const Head& head, const RouteMatch& match) const {
+Answer<void> Exchange::check(const Head& head, const Endpoint* endpoint) const {
   if (auto origin = check_origin(head); !origin) return origin;
-  if (!rules_.token_hashes.empty() && !is_open_to_all(match) && !carries_token(head, rules_.token_hashes))
+  if (!rules_.token_hashes.empty() && !is_open_to_all(endpoint) && !carries_token(head, rules_.token_hashes))
     return refuse("unauthorized", "this server asks for a token: Authorization: Bearer TOKEN");
-  if (match.endpoint == nullptr) return {};
+  if (endpoint == nullptr) return {};
   const std::string_view expect = field_of(head, "expect");
   if (!expect.empty() && expect != "100-continue")
     return refuse("expectation_failed", "only 100-continue is understood");
-  if (!takes_body(*match.endpoint)) return {};
+  if (!takes_body(*endpoint)) return {};
   const std::string_view encoding = field_of(head, "content-encoding");
   if (!encoding.empty() && encoding != "identity")
     return refuse("unsupported_encoding", "bodies are taken as they are, without Content-Encoding");
@@ -128,76 +126,50 @@ Answer<void> Exchange::check(const Head& head, const RouteMatch& match) const {
   return {};
 }
 
-Reply Exchange::dispatch(Request& request, const RouteMatch& match) {
-  if (match.endpoint == nullptr) {
-    if (!match.allow.empty())
-      return request.head.method == "OPTIONS" ? options_reply(match) : method_not_allowed(match);
-    auto file = fallback_(request);
-    return file ? std::move(*file) : not_found();
-  }
-  if (!takes_body(*match.endpoint)) return (*match.handler)(request);
+Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Request& request) {
+  if (auto allowed = check(request.head, endpoint); !allowed) return problem_reply(allowed.error());
+  if (endpoint == nullptr || !takes_body(*endpoint)) return handler(request);
   request.upload = uploads_.enter();
   if (!request.upload)
     return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
-  return (*match.handler)(request);
-}
-
-Reply Exchange::answer(const Head& head, Request& request, const RouteMatch& match, AccessEntry& entry) {
-  if (auto allowed = check(head, match); !allowed) return problem_reply(allowed.error());
-  const Problem generic =
-      make_problem("internal", "something went wrong on our side; the log knows it by the request id");
-  try {
-    return dispatch(request, match);
-  } catch (const std::exception& failure) {
-    entry.fault = failure.what();
-  } catch (...) {
-    entry.fault = "an exception of unknown type";
-  }
-  return problem_reply(generic);
+  return handler(request);
 }
 
 bool Exchange::serve(Connection& connection, std::string_view head_text, const std::string& peer) {
   const auto begin = std::chrono::steady_clock::now();
-  AccessEntry entry;
-  entry.peer = peer;
   auto head = parse_head(head_text);
-  const bool understood = head.has_value();
   Request request;
+  if (head) request.head = std::move(*head);
   request.peer = peer;
   request.client = &connection;
-  request.id = request_id_of(understood ? field_of(*head, "x-request-id") : std::string_view());
-  ConnectionBody body(connection, understood ? head->content_length.value_or(0) : 0,
-                      understood && field_of(*head, "expect") == "100-continue");
+  request.id = request_id_of(field_of(request.head, "x-request-id"));
+  ConnectionBody body(connection, request.head.content_length.value_or(0),
+                      field_of(request.head, "expect") == "100-continue");
   request.body = &body;
 
-  Reply reply;
-  if (understood) {
-    const RouteMatch match = router_.match(head->method, head->path);
-    request.path_params = match.params;
-    request.head = *head;
-    entry.method = head->method;
-    entry.path = head->path;
-    entry.operation = match.endpoint != nullptr ? match.endpoint->operation : "none";
-    reply = answer(*head, request, match, entry);
-  } else {
-    entry.operation = "none";
-    reply = problem_reply(head.error());
-  }
-  stamp(reply, request.id);
-  try {
-    write_reply(connection, reply, request.id, entry.method == "HEAD");
-  } catch (const std::exception& failure) {  // too late for a 500: the connection ends early and the client sees that
-    entry.fault = failure.what();
-  }
+  if (!head) head.error().request_id = request.id;
+  const Outcome outcome = head ? library_.serve(request) : library_.refuse(head.error(), connection);
 
+  AccessEntry entry;
   entry.request_id = request.id;
-  entry.status = reply.status;
+  entry.peer = peer;
+  entry.method = request.head.method;
+  entry.path = request.head.path;
+  entry.operation = outcome.operation;
+  entry.fault = outcome.fault;
+  entry.status = outcome.status;
   entry.bytes = connection.bytes_written();
   entry.seconds = seconds_since(begin);
   metrics_.request(entry.operation, entry.status, entry.seconds);
   if (log_) log_(access_line(entry));
   // After a refusal bytes may still be on their way, announced or not.
-  return reply.status < 400 && body.drained();
+  return outcome.status > 0 && outcome.status < 400 && body.drained();
+}
+
+std::string Exchange::refusal_text(const Problem& problem) const {
+  TextSink sink;
+  library_.refuse(problem, sink);
+  return sink.text;
 }
 
 }  // namespace kiln

@@ -8,8 +8,8 @@
 #include "server/http/access_log.h"
 #include "server/http/connection.h"
 #include "server/http/gate.h"
+#include "server/http/httplib_server.h"
 #include "server/http/metrics.h"
-#include "server/http/router.h"
 
 namespace kiln {
 
@@ -21,25 +21,25 @@ struct ExchangeRules {
 
 class Exchange {
  public:
-  /// `fallback` answers GET of paths that no endpoint has (the viewer's files); it may leave them unanswered.
-  Exchange(ExchangeRules rules, Router router, std::function<std::optional<Reply>(Request&)> fallback, Gate& uploads,
-           HttpMetrics& metrics, LogLine log);
+  /// `elsewhere` answers what has no endpoint (the viewer's files).
+  Exchange(ExchangeRules rules, const Handlers& handlers, const Handler& elsewhere, Gate& uploads, HttpMetrics& metrics,
+           LogLine log);
 
   /// Serves one request. True when its bytes were read to the end.
   bool serve(Connection&, std::string_view head, const std::string& peer);
+  /// The reply to a connection that never reaches a worker. It is neither counted nor logged.
+  std::string refusal_text(const Problem&) const;
 
  private:
-  Reply answer(const Head&, Request&, const RouteMatch&, AccessEntry&);
-  Reply dispatch(Request&, const RouteMatch&);
-  Answer<void> check(const Head&, const RouteMatch&) const;
+  Reply dispatch(const Endpoint*, const Handler&, Request&);
+  Answer<void> check(const Head&, const Endpoint*) const;
   Answer<void> check_origin(const Head&) const;
 
   ExchangeRules rules_;
-  Router router_;
-  std::function<std::optional<Reply>(Request&)> fallback_;
   Gate& uploads_;
   HttpMetrics& metrics_;
   LogLine log_;
+  HttplibServer library_;
 };
 
 /// The client's own X-Request-Id if it is a harmless one, else a fresh one.

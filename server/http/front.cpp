@@ -35,6 +35,7 @@ bool is_resource_shortage(int error) {
 struct Front::State {
   FrontOptions options;
   ServeHead serve;
+  RefusalText refusal;
   WorkQueue queue;
   Listener listener;
   int epoll = -1;
@@ -57,7 +58,8 @@ struct Front::State {
   mutable std::mutex stats_mutex;
   FrontStats stats;
 
-  State(FrontOptions o, ServeHead s) : options(std::move(o)), serve(std::move(s)), queue(options.max_queued) {}
+  State(FrontOptions o, ServeHead s, RefusalText r)
+      : options(std::move(o)), serve(std::move(s)), refusal(std::move(r)), queue(options.max_queued) {}
 
   template <class Change>
   void count(Change change) {
@@ -86,7 +88,7 @@ struct Front::State {
   }
 
   void refuse_now(int fd, const Problem& problem) {
-    const std::string reply = bare_refusal(problem.status, problem);
+    const std::string reply = refusal(problem);
     [[maybe_unused]] const ssize_t ignored = send(fd, reply.data(), reply.size(), MSG_NOSIGNAL);
     linger(fd);
   }
@@ -283,8 +285,8 @@ struct Front::State {
   }
 };
 
-Front::Front(FrontOptions options, ServeHead serve)
-    : state_(std::make_unique<State>(std::move(options), std::move(serve))) {
+Front::Front(FrontOptions options, ServeHead serve, RefusalText refusal)
+    : state_(std::make_unique<State>(std::move(options), std::move(serve), std::move(refusal))) {
   state_->epoll = epoll_create1(EPOLL_CLOEXEC);
   state_->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
 }

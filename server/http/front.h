@@ -41,10 +41,12 @@ struct FrontStats {
 
 /// What a worker does with a complete head. Returns true when the request was read to its end.
 using ServeHead = std::function<bool(Connection&, std::string_view head, const std::string& peer)>;
+/// The reply to a connection that never reaches a worker.
+using RefusalText = std::function<std::string(const Problem&)>;
 
 class Front {
  public:
-  Front(FrontOptions options, ServeHead serve);
+  Front(FrontOptions options, ServeHead serve, RefusalText refusal);
   ~Front();
   /// Binds and listens; the port. Fails  bind_failed: the address is in use or not ours.
   Result<int> bind();
@@ -58,8 +60,5 @@ class Front {
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// An immediate 503 or 431 for a connection that never reaches a worker.
-std::string bare_refusal(int status, const Problem& problem);
 
 }  // namespace kiln

@@ -1,10 +1,12 @@
 #include "server/http/http_server.h"
 
+#include <pthread.h>
 #include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
 
+#include "core/base/expects.h"
 #include "server/http/exchange.h"
 #include "server/http/routes.h"
 
@@ -40,6 +42,19 @@ Handlers all_routes(RouteContext& context) {
   return all;
 }
 
+/// The library's routes are std::regex, which recurses for every byte of a path: 1.3 MB for the longest. Under a tight
+/// `ulimit -s` (or none: then threads get 2 MB) one such request would end the server (reliability.md H14).
+void deepen_stacks() {
+  constexpr std::size_t kStackBytes = 8u << 20;
+  pthread_attr_t defaults;
+  EXPECTS(pthread_getattr_default_np(&defaults) == 0);
+  std::size_t bytes = 0;
+  EXPECTS(pthread_attr_getstacksize(&defaults, &bytes) == 0);
+  if (bytes < kStackBytes)
+    EXPECTS(pthread_attr_setstacksize(&defaults, kStackBytes) == 0 && pthread_setattr_default_np(&defaults) == 0);
+  pthread_attr_destroy(&defaults);
+}
+
 }  // namespace
 
 struct HttpServer::State {
@@ -57,11 +72,14 @@ struct HttpServer::State {
         streams(options.max_streams),
         downloads(options.max_downloads),
         context{s, streams, downloads, draining, options.heartbeat, [this] { return metrics_text(); }},
-        exchange({options.max_upload_bytes, options.hosts, options.token_hashes}, Router(all_routes(context)),
-                 viewer_file, uploads, metrics, options.log),
-        front(front_options(options), [this](Connection& connection, std::string_view head, const std::string& peer) {
-          return exchange.serve(connection, head, peer);
-        }) {}
+        exchange({options.max_upload_bytes, options.hosts, options.token_hashes}, all_routes(context), viewer_file,
+                 uploads, metrics, options.log),
+        front(
+            front_options(options),
+            [this](Connection& connection, std::string_view head, const std::string& peer) {
+              return exchange.serve(connection, head, peer);
+            },
+            [this](const Problem& problem) { return exchange.refusal_text(problem); }) {}
 
   std::string metrics_text() {
     MetricsInput in;
@@ -81,6 +99,7 @@ std::vector<std::string> loopback_hosts() { return {"127.0.0.1", "localhost", "[
 HttpServer::HttpServer(const HttpOptions& options, Service& service)
     : state_(std::make_unique<State>(options, service)) {
   raise_descriptor_limit();
+  deepen_stacks();
 }
 
 HttpServer::~HttpServer() = default;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -24,7 +25,8 @@ struct Field {
 
 struct Head {
   std::string method;
-  std::string path;  // percent-decoded, starts with '/'
+  std::string path;      // percent-decoded, starts with '/'
+  std::string raw_path;  // as it was sent
   QueryParams params;
   std::vector<Field> fields;
   std::optional<std::uint64_t> content_length;
@@ -81,5 +83,9 @@ struct Request {
 
 /// The value of a path parameter that the route has.
 const std::string& path_param(const Request&, std::string_view name);
+
+using Handler = std::function<Reply(Request&)>;
+/// By the operation of their endpoint (server/api/endpoints.h).
+using Handlers = std::map<std::string, Handler, std::less<>>;
 
 }  // namespace kiln

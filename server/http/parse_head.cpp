@@ -17,6 +17,11 @@ bool is_token(std::string_view text) {
   });
 }
 
+bool is_method(std::string_view text) {
+  constexpr std::string_view kMethods[] = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"};
+  return std::ranges::find(kMethods, text) != std::end(kMethods);
+}
+
 bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
 
 bool is_field_value(std::string_view text) {
@@ -102,6 +107,7 @@ Answer<void> parse_target(std::string_view target, const HeadLimits& limits, Hea
   auto path = percent_decode(target.substr(0, question));
   if (!path) return malformed("the path has a broken escape, a control byte or is no UTF-8");
   head.path = std::move(*path);
+  head.raw_path = target.substr(0, question);
   return parse_query(target.substr(std::min(question + 1, target.size())), head);
 }
 
@@ -116,6 +122,7 @@ Answer<void> parse_request_line(std::string_view line, const HeadLimits& limits,
     return malformed("the request line is malformed");
   if (!version.starts_with("HTTP/")) return malformed("the request line names no HTTP version");
   if (version != "HTTP/1.1" && version != "HTTP/1.0") return refuse("version_not_supported", "HTTP/1.1 is spoken here");
+  if (!is_method(line.substr(0, first))) return refuse("not_implemented", "no address here takes this method");
   head.method = line.substr(0, first);
   return parse_target(target, limits, head);
 }

@@ -14,7 +14,7 @@ struct HeadLimits {
 };
 
 /// `text` ends with the empty line. Codes: malformed_request (400), length_required (411, chunked bodies),
-/// uri_too_long (414), header_too_large (431), version_not_supported (505).
+/// uri_too_long (414), header_too_large (431), not_implemented (501, a method), version_not_supported (505).
 Answer<Head> parse_head(std::string_view text, const HeadLimits& = {});
 
 /// Percent-decodes; nothing when an escape is broken or the result has a control byte or is not UTF-8.

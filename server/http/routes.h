@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "server/http/gate.h"
-#include "server/http/router.h"
+#include "server/http/message.h"
 #include "server/work/service.h"
 
 namespace kiln {
@@ -29,7 +29,7 @@ Handlers recipe_routes(RouteContext&);
 Handlers service_routes(RouteContext&);
 Handlers viewer_routes();
 
-/// A file of the built viewer for a path without an endpoint.
-std::optional<Reply> viewer_file(Request&);
+/// A file of the built viewer for a path without an endpoint, or 404.
+Reply viewer_file(Request&);
 
 }  // namespace kiln

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/bake/bake.h"
+#include "server/api/endpoints.h"
 #include "server/http/reply_of.h"
 #include "server/http/routes.h"
 

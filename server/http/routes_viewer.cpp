@@ -54,11 +54,11 @@ Handlers viewer_routes() {
   return {{"galleryPage", page("index.html")}, {"viewerPage", page("view.html")}, {"docsPage", page("docs.html")}};
 }
 
-std::optional<Reply> viewer_file(Request& request) {
-  if (request.head.method != "GET" && request.head.method != "HEAD") return std::nullopt;
-  const Asset* asset = find_asset(std::string_view(request.head.path).substr(1));
-  if (asset == nullptr) return std::nullopt;
-  return asset_reply(request.head, *asset);
+Reply viewer_file(Request& request) {
+  const bool reads = request.head.method == "GET" || request.head.method == "HEAD";
+  const Asset* asset = reads ? find_asset(std::string_view(request.head.path).substr(1)) : nullptr;
+  return asset != nullptr ? asset_reply(request.head, *asset)
+                          : problem_reply(make_problem("not_found", "there is nothing at this address"));
 }
 
 }  // namespace kiln

@@ -104,6 +104,21 @@ TEST(Events, StreamsAreCappedAndFreedWhenTheirClientGoes) {
   EXPECT_TRUE(open);
 }
 
+TEST(Events, TwentyStreamsDoNotSlowAHealthCheck) {
+  HttpOptions options = few_threads();
+  options.max_streams = 20;
+  RunningServer server(options);
+  std::vector<std::unique_ptr<RawConnection>> streams;
+  for (int i = 0; i < 20; ++i) {
+    streams.push_back(std::make_unique<RawConnection>(server.port()));
+    streams.back()->send(request_text("GET", "/v1/events"));
+    streams.back()->read_until("retry: 2000");
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(server.get("/healthz").status, 200);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 1s);  // 3.5 s each with the eight threads of the library
+}
+
 TEST(Events, ASilentStreamBeatsSoThatADeadClientIsNoticed) {
   HttpOptions options = few_threads();
   options.heartbeat = 100ms;

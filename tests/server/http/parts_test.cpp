@@ -1,4 +1,4 @@
-// The pieces below the routes: heads, escapes, forms, the path table.
+// The pieces below the routes: heads, escapes, forms.
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include "core/base/random.h"
 #include "server/http/multipart.h"
 #include "server/http/parse_head.h"
-#include "server/http/router.h"
 
 namespace kiln {
 namespace {
@@ -138,18 +137,6 @@ TEST(Multipart, NeedsABoundary) {
   for (const char* type : {"multipart/form-data", "multipart/form-data; boundary=", "multipart/form-data; boundary=\"",
                            "multipart/form-data; boundary=\"a b\""})
     EXPECT_FALSE(MultipartReader::open(form_head(type), body).has_value()) << type;
-}
-
-TEST(Router, HasAHandlerForEveryEndpointOrDoesNotStart) {
-  EXPECT_ANY_THROW(Router(Handlers{}));
-  Handlers handlers;
-  for (const Endpoint& endpoint : endpoints())
-    handlers[std::string(endpoint.operation)] = [](Request&) { return Reply{}; };
-  const Router router(handlers);
-  const RouteMatch match = router.match("GET", "/v1/jobs/abc/artifacts/scene.glb");
-  ASSERT_NE(match.endpoint, nullptr);
-  EXPECT_EQ(match.endpoint->operation, "getArtifact");
-  EXPECT_EQ(match.params, (std::vector<std::pair<std::string, std::string>>{{"id", "abc"}, {"name", "scene.glb"}}));
 }
 
 }  // namespace
