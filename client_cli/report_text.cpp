@@ -83,8 +83,8 @@ std::string certificate_text(std::string_view report) {
                     percent(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
                     percent(number_of(certificate, "p99")) + ", bias " + percent(number_of(certificate, "bias")) +
                     ", at " + count(number_of(certificate, "points")) + " points";
-  if (certificate.contains("truncation") && certificate["truncation"].is_object())
-    out += "\ntruncation of the light: " + error_text(certificate["truncation"]);
+  if (certificate.contains("job_light") && certificate["job_light"].is_object())
+    out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
   return out;
 }
 

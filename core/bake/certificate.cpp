@@ -15,16 +15,19 @@
 namespace kiln {
 namespace {
 
+constexpr std::size_t kFewestPoints = 1024, kMostPoints = 8192;
+constexpr int kPilotSamples = 16;
+
 /// Points on the delivered surface and their places on the input's.
 struct Probe {
   std::vector<TrianglePoint> delivered;
   std::vector<ReferencePoint> truth;
 };
 
-Probe probe_surface(const Mesh& delivered, const Mesh& input, const CertificateOptions& options) {
+Probe probe_surface(const Mesh& delivered, const Mesh& input, std::size_t points, std::uint64_t seed) {
   const ClosestPoint nearest(input);
   Probe probe;
-  for (const SurfaceSample& s : sample_surface(delivered, options.points, mix64(options.seed ^ 0x636572746966ULL))) {
+  for (const SurfaceSample& s : sample_surface(delivered, points, mix64(seed ^ 0x636572746966ULL))) {
     const SurfaceMatch here{s.triangle, s.u, s.v, 0};
     const auto match = nearest.query(match_position(delivered, here), match_normal(delivered, here));
     if (!match) continue;
@@ -146,16 +149,100 @@ ErrorStats statistics(const Samples& samples, std::size_t points, std::uint64_t 
   return compute_error({samples.shown, samples.truth, samples.noise, points}, {.seed = seed});
 }
 
-/// Paths a point for a share of the bake's rays. A few pilot paths tell how many rays a path takes here: 2 on a bunny
-/// under the sky, 40 in a white room. A function of the scene alone, so that reports repeat.
-int affordable_samples(const Tracer& truth, const Probe& probe, const ReferenceLight& light,
-                       const CertificateOptions& options, Threads& threads) {
+/// What a run of the reference at some points tells.
+struct Judgement {
+  Samples transport;  // of all lightings
+  Samples job_light;  // empty: the job has none
+  std::uint64_t rays = 0;
+};
+
+/// The job's environment in full (the reference's first lighting) and the lamps (its last), seen together.
+Samples job_light_samples(const BakedScene& baked, const Probe& probe, const ReferenceLight& light,
+                          const ReferenceResult& reference) {
+  const std::size_t points = probe.truth.size(), last = reference.value.size() - points;
+  if (points == 0 || (light.environments.empty() && !light.scene_lights)) return {};
+  const auto together = [&](const std::vector<Vec3d>& values, std::size_t point) {
+    Vec3d sum;
+    if (!light.environments.empty()) sum += values[point];
+    if (light.scene_lights) sum += values[last + point];
+    return sum;
+  };
+  Samples out;
+  std::vector<Vec3d> half_a, half_b;
+  for (std::size_t i = 0; i < points; ++i) {
+    out.shown.push_back(to_double(value_at(baked.transfer, probe.delivered[i], baked.light.coefficients)));
+    out.truth.push_back(together(reference.value, i));
+    half_a.push_back(together(reference.half_a, i));
+    half_b.push_back(together(reference.half_b, i));
+  }
+  out.noise = noise_from_halves(half_a, half_b);
+  return out;
+}
+
+/// The light of the reference: the job's environment in full, then the test lightings, then the lamps.
+ReferenceLight reference_light(const BakedScene& baked, const std::optional<Environment>& environment,
+                               const Lightings& lightings) {
+  ReferenceLight light;
+  if (environment) light.environments.push_back(*environment);
+  light.sh_order = baked.transfer.order;
+  light.sh = lightings.sh;
+  light.scene_lights = baked.transfer.fixed;
+  return light;
+}
+
+class Judge {
+ public:
+  Judge(const BakedScene& baked, const Tracer& truth, const std::optional<Environment>& environment, Threads& threads)
+      : baked_(baked),
+        truth_(truth),
+        threads_(threads),
+        lightings_(test_lightings(baked)),
+        light_(reference_light(baked, environment, lightings_)) {}
+
+  Judgement judge(const Probe& probe, int samples, std::uint64_t seed) const {
+    const ReferenceResult reference =
+        trace_reference(truth_, probe.truth, light_, {.samples = samples, .seed = seed}, threads_);
+    const Samples full{{}, reference.value, noise_from_halves(reference.half_a, reference.half_b)};
+    const std::size_t skipped = light_.environments.size() * probe.truth.size();
+    const auto kept = [&](const std::vector<Vec3d>& all) {
+      return std::vector<Vec3d>(all.begin() + static_cast<std::ptrdiff_t>(skipped), all.end());
+    };
+    return {{shown_values(baked_, probe, lightings_), kept(full.truth), kept(full.noise)},
+            job_light_samples(baked_, probe, light_, reference),
+            reference.rays};
+  }
+
+  Samples judged(const Judgement& all, Certificate& certificate) const {
+    return judged_lightings(all.transport, lightings_, light_.scene_lights, certificate);
+  }
+
+ private:
+  const BakedScene& baked_;
+  const Tracer& truth_;
+  Threads& threads_;
+  Lightings lightings_;
+  ReferenceLight light_;
+};
+
+struct Spending {
+  std::size_t points = kFewestPoints;
+  int samples = 256;
+};
+
+/// A function of the scene and the bake's rays, never of time, so that reports repeat.
+Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint64_t bake_rays) {
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
-  constexpr int kPilot = 8;
-  const ReferenceResult pilot = trace_reference(truth, probe.truth, light, {.samples = kPilot}, threads);
-  const double per_sample = static_cast<double>(std::max<std::uint64_t>(pilot.rays, 1)) / kPilot;  // of all points
-  return static_cast<int>(
-      std::clamp(kShare * static_cast<double>(options.bake_rays) / (kSingleRay * per_sample), 256.0, 4096.0));
+  constexpr double kFewestPaths = 192 * kFewestPoints, kMostPaths = 4096 * kFewestPoints;  // the fewest: .1 s
+  constexpr double kNoise =
+      0.75;  // of the error, as standard deviations at a point: over thousands of points it is nothing
+  const double paths =
+      std::clamp(kShare * static_cast<double>(bake_rays) / (kSingleRay * rays_per_path), kFewestPaths, kMostPaths);
+  const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance
+  const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
+  Spending out;
+  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / kFewestPoints));
+  out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, double{kFewestPoints}, double{kMostPoints}));
+  return out;
 }
 
 }  // namespace
@@ -163,37 +250,30 @@ int affordable_samples(const Tracer& truth, const Probe& probe, const ReferenceL
 Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::optional<Environment>& environment,
                     const CertificateOptions& options, Threads& threads) {
   const auto start = std::chrono::steady_clock::now();
-  const Probe probe = probe_surface(decoded.scene.mesh, truth.scene().mesh, options);
-  const Lightings lightings = test_lightings(decoded);
+  const Judge judge(decoded, truth, environment, threads);
+  const std::uint64_t seed = mix64(options.seed ^ 0x7472757468ULL);
+  const auto probe = [&](std::size_t points) {
+    return probe_surface(decoded.scene.mesh, truth.scene().mesh, points, options.seed);
+  };
 
-  ReferenceLight light;
-  if (environment) light.environments.push_back(*environment);
-  light.sh_order = decoded.transfer.order;
-  light.sh = lightings.sh;
-  light.scene_lights = decoded.transfer.fixed;
-  const int samples = affordable_samples(truth, probe, light, options, threads);
-  const ReferenceResult reference =
-      trace_reference(truth, probe.truth, light,
-                      {.samples = samples, .bounces = -1, .seed = mix64(options.seed ^ 0x7472757468ULL)}, threads);
+  Certificate pilot;
+  const Probe few = probe(kFewestPoints);
+  pilot.points = few.truth.size();
+  const Judgement first = judge.judge(few, kPilotSamples, mix64(seed));
+  const Samples judged = judge.judged(first, pilot);
+  const ErrorStats known =
+      compute_error({judged.shown, judged.truth, judged.noise, pilot.points}, {.seed = options.seed, .resamples = 1});
+  const double paths = static_cast<double>(std::max<std::size_t>(pilot.points, 1)) * kPilotSamples;
+  const Spending spending =
+      plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options.bake_rays);
 
   Certificate out;
-  out.points = probe.truth.size();
-  out.samples = samples;
-  const Samples full{{}, reference.value, noise_from_halves(reference.half_a, reference.half_b)};
-  Samples all{shown_values(decoded, probe, lightings), {}, {}};
-  const std::size_t skipped = light.environments.size() * out.points;
-  all.truth.assign(full.truth.begin() + static_cast<std::ptrdiff_t>(skipped), full.truth.end());
-  all.noise.assign(full.noise.begin() + static_cast<std::ptrdiff_t>(skipped), full.noise.end());
-  out.transport = statistics(judged_lightings(all, lightings, light.scene_lights, out), out.points, options.seed);
-  if (environment && environment->radiance.size() > 1) {
-    const std::size_t job = (lightings.sh.size() - 1) * out.points;  // the job's own light is the last distant one
-    Samples sky;
-    sky.shown.assign(all.shown.begin() + static_cast<std::ptrdiff_t>(job),
-                     all.shown.begin() + static_cast<std::ptrdiff_t>(job + out.points));
-    sky.truth.assign(full.truth.begin(), full.truth.begin() + static_cast<std::ptrdiff_t>(out.points));
-    sky.noise.assign(full.noise.begin(), full.noise.begin() + static_cast<std::ptrdiff_t>(out.points));
-    out.truncation = statistics(sky, out.points, options.seed);
-  }
+  const Probe many = probe(spending.points);
+  out.points = many.truth.size();
+  out.samples = spending.samples;
+  const Judgement all = judge.judge(many, spending.samples, seed);
+  out.transport = statistics(judge.judged(all, out), out.points, options.seed);
+  if (!all.job_light.truth.empty()) out.job_light = statistics(all.job_light, out.points, options.seed);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return out;
 }

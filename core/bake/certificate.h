@@ -6,7 +6,10 @@
 // Transport error: lightings of the artefact's own order (constant, six lobes, the job's light, the scene's lamps).
 //                  A lighting of which less than a hundredth reaches the surface, in truth and in the artefact, is
 //                  listed as dark and not judged: relative to nothing, every rounding is an error.
-// Truncation: the job's environment in full detail against the artefact under its projection, reported apart.
+// Job light The artefact as the job lights it against that light in full detail, lamps and all: what `kiln eval` and
+//           `kiln reference` show. It adds what the order cannot hold of a sharp sky.
+// Spending  A pilot tells the error and the reference's noise. Paths are as many as keep that noise below the error;
+//           what they leave of the budget goes into more points, since the interval hangs on a few bad ones.
 // Never changes the artefact.   Repeat  same numbers for any thread count.
 
 #include <cstdint>
@@ -23,18 +26,17 @@
 namespace kiln {
 
 struct CertificateOptions {
-  std::size_t points = 1024;
-  std::uint64_t bake_rays = 0;  // what the bake sent: paths cost about 5 % of it, or about a second
+  std::uint64_t bake_rays = 0;  // what the bake sent: the certificate costs about 5 % of it, or a second
   std::uint64_t seed = 0;       // mixed so that it never repeats the bake's own samples
 };
 
 struct Certificate {
   ErrorStats transport;
-  std::vector<std::string> lightings;    // names, in the order of transport.by_lighting
-  std::vector<std::string> dark;         // lightings that hardly reach the surface: not judged
-  std::optional<ErrorStats> truncation;  // of the job's environment, when it is a map or a formula
-  std::size_t points = 0;                // matched on the input surface
-  int samples = 0;                       // paths per point, from 256 to 4096
+  std::vector<std::string> lightings;   // names, in the order of transport.by_lighting
+  std::vector<std::string> dark;        // lightings that hardly reach the surface: not judged
+  std::optional<ErrorStats> job_light;  // when the job has any
+  std::size_t points = 0;               // matched on the input surface
+  int samples = 0;                      // paths per point
   double seconds = 0;
 };
 

@@ -70,7 +70,7 @@ ordered_json certificate_object(const std::optional<Certificate>& certificate) {
         {{"name", certificate->lightings[i]}, {"relrmse", certificate->transport.by_lighting[i]}});
   }
   out["dark"] = certificate->dark;
-  if (certificate->truncation) out["truncation"] = error_object(*certificate->truncation);
+  if (certificate->job_light) out["job_light"] = error_object(*certificate->job_light);
   out["seconds"] = certificate->seconds;
   return out;
 }
