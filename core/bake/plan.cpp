@@ -22,9 +22,9 @@ struct Grade {
   int bits;
 };
 constexpr std::array<Grade, 3> kGrades = {{
-    {"draft", 4, 256, 64, 64, 0.03, 10'000, 2e-4F, 10},
-    {"standard", 6, 1024, 256, 256, 0.01, 40'000, 5e-5F, 12},
-    {"final", 6, 4096, 1024, 1024, 0.002, 160'000, 1e-5F, 14},
+    {"draft", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10},
+    {"standard", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12},
+    {"final", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14},
 }};
 
 /// Measured on the machine of core/prt/README.md, one thread: million rays a second, and bytes a vertex.
