@@ -22,7 +22,8 @@ class DirectSource {
         sky_(tracer, {.order = plan.order, .samples = plan.samples, .seed = seed}),
         plan_(plan),
         seed_(seed),
-        threads_(threads) {}
+        threads_(threads),
+        lamp_scale_(plan.lamps ? measure_lamp_scale() : 1) {}
 
   std::size_t lamp_columns() const { return plan_.lamps ? 4 : 0; }
   std::size_t bands() const { return static_cast<std::size_t>(sh_count(plan_.order)); }
@@ -41,7 +42,6 @@ class DirectSource {
     if (!plan_.lamps) return sky;
     const std::vector<Vec3f> lamps =
         bake_fixed_direct(tracer_, batch, {.samples = plan_.lamp_samples, .seed = seed_}, threads_, &stats);
-    if (lamp_scale_ == 0) lamp_scale_ = measure_lamp_scale(lamps);
     return join(sky, lamps);
   }
 
@@ -63,10 +63,15 @@ class DirectSource {
  private:
   static constexpr float kOpenConstantBand = 0.2820948F;  // t_0 of an unoccluded point: Y(0,0)
 
-  static float measure_lamp_scale(const std::vector<Vec3f>& lamps) {
+  /// From about a thousand vertices spread over the input, whatever batches will be asked for.
+  float measure_lamp_scale() {
+    const std::vector<TransferPoint> all = vertex_points(tracer_.scene().mesh);
+    std::vector<TransferPoint> some;
+    for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
     double sum = 0;
-    for (const Vec3f& x : lamps) sum += x.x + x.y + x.z;
-    const double mean = lamps.empty() ? 0 : sum / (3.0 * static_cast<double>(lamps.size()));
+    for (const Vec3f& x : bake_fixed_direct(tracer_, some, {.samples = plan_.lamp_samples, .seed = seed_}, threads_))
+      sum += x.x + x.y + x.z;
+    const double mean = some.empty() ? 0 : sum / (3.0 * static_cast<double>(some.size()));
     return mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
   }
 
@@ -85,7 +90,7 @@ class DirectSource {
   const Plan& plan_;
   std::uint64_t seed_;
   Threads& threads_;
-  float lamp_scale_ = 0;
+  float lamp_scale_;
 };
 
 /// The mesh to light and the joined columns of direct light at its vertices.
