@@ -233,8 +233,7 @@ struct Spending {
 Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint64_t bake_rays) {
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
   constexpr double kFewestPaths = 192 * kFewestPoints, kMostPaths = 4096 * kFewestPoints;  // the fewest: .1 s
-  constexpr double kNoise =
-      0.75;  // of the error, as standard deviations at a point: over thousands of points it is nothing
+  constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
   const double paths =
       std::clamp(kShare * static_cast<double>(bake_rays) / (kSingleRay * rays_per_path), kFewestPaths, kMostPaths);
   const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance

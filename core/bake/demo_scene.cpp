@@ -59,7 +59,7 @@ Vec3f knot_center(float t) {
 }
 
 void add_knot(Piece& piece, const Vec3f& center, std::array<int, 2> segments) {
-  const auto [along, around] = segments;
+  const int along = segments[0], around = segments[1];
   constexpr float kTurn = 2 * std::numbers::pi_v<float>;
   for (int i = 0; i < along; ++i) {
     const float t = kTurn * static_cast<float>(i) / static_cast<float>(along);

@@ -101,8 +101,9 @@ Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, co
       for (std::size_t x = 0; x < width; ++x) {
         Vec3f sum;
         for (int s = 0; s < preview.grid * preview.grid; ++s) {
-          const float dx = (static_cast<float>(s % preview.grid) + 0.5F) / static_cast<float>(preview.grid);
-          const float dy = (static_cast<float>(s / preview.grid) + 0.5F) / static_cast<float>(preview.grid);
+          const int column = s % preview.grid, row = s / preview.grid;
+          const float dx = (static_cast<float>(column) + 0.5F) / static_cast<float>(preview.grid);
+          const float dy = (static_cast<float>(row) + 0.5F) / static_cast<float>(preview.grid);
           const float px = (static_cast<float>(x) + dx) / static_cast<float>(width) * 2 - 1;
           const float py = 1 - (static_cast<float>(y) + dy) / static_cast<float>(height) * 2;
           const Vec3f direction = normalized(camera.forward + camera.right * px + camera.up * py);

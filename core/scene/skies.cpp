@@ -62,7 +62,8 @@ void add_sun(Environment& e) {
       if (dot(direction(i + 0.5, j + 0.5), sun) < std::cos(0.05)) continue;
       int inside = 0;
       for (int k = 0; k < kGrid * kGrid; ++k) {
-        const Vec3d w = direction(i + (k % kGrid + 0.5) / kGrid, j + (k / kGrid + 0.5) / kGrid);
+        const int column = k % kGrid, row = k / kGrid;
+        const Vec3d w = direction(i + (column + 0.5) / kGrid, j + (row + 0.5) / kGrid);
         inside += dot(w, sun) >= cosine ? 1 : 0;
       }
       const auto at = static_cast<std::size_t>(j * kSkyWidth + i);
