@@ -27,7 +27,7 @@ std::optional<Span> encoded_bytes(const ImageSource& source, const BufferBytes& 
 
 std::optional<ImageHeader> checked_header(Span encoded, std::uint64_t& pixels, const ImportLimits& limits,
                                           const std::string& place, Findings& findings) {
-  const auto header = read_image_header(encoded);
+  auto header = read_image_header(encoded);
   if (!header) {
     findings.fail("image_type", "The image is neither PNG nor JPEG, or its header is broken.", place);
     return std::nullopt;

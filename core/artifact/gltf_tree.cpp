@@ -37,9 +37,10 @@ void check_version(const Json& root, Findings& findings) {
   const Json* asset = find(root, {"asset"});
   const Json* version = find(root, {"asset", "version"});
   if (asset && !asset->is_object()) return;  // for check_tree to say
-  if (!version || *version == "") {
+  const bool is_text = version && version->is_string();
+  if (!version || (is_text && version->get_ref<const std::string&>().empty())) {
     findings.fail("asset_version_missing", "A glTF must say its version.", "/asset/version");
-  } else if (version->is_string() && version->get_ref<const std::string&>().substr(0, 2) != "2.") {
+  } else if (is_text && version->get_ref<const std::string&>().substr(0, 2) != "2.") {
     findings.fail("unsupported_version", "Only glTF 2.x is read.", "/asset/version");
   }
 }

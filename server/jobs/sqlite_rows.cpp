@@ -33,9 +33,13 @@ Result<void> read_inputs(Database& db, Job& job) {
     if (!more) return {};
     const std::string role = rows.text(0);
     NamedBlob file{rows.text(1), rows.text(2)};
-    if (role == kScene) job.inputs.scene = std::move(file);
-    if (role == kResource) job.inputs.resources.push_back(std::move(file));
-    if (role == kEnvironment) job.inputs.environment = std::move(file);
+    if (role == kScene) {
+      job.inputs.scene = std::move(file);
+    } else if (role == kResource) {
+      job.inputs.resources.push_back(std::move(file));
+    } else if (role == kEnvironment) {
+      job.inputs.environment = std::move(file);
+    }
   }
 }
 
