@@ -40,8 +40,8 @@ Command<T> add_command(Program& program, const std::string& name, const std::str
 }
 
 void add_server(Program& program, CLI::App* parser) {
-  parser->add_option("--server", program.options.common.server, "address of the server")
-      ->envname(kServerVariable)
+  // Not ->envname(): the library would let the variable of commands that were not given overrule the option.
+  parser->add_option("--server", program.options.common.server, "address of the server; KILN_SERVER without it")
       ->type_name("URL");
 }
 
@@ -240,7 +240,9 @@ std::vector<std::string> words_of(int argc, const char* const* argv) {
 }
 
 void finish(Program& program) {
-  if (program.local) program.options.common.server.clear();
+  std::string& server = program.options.common.server;
+  if (const char* variable = std::getenv(kServerVariable); variable && server.empty()) server = variable;
+  if (program.local) server.clear();
   if (const char* token = std::getenv(kTokenVariable)) program.options.common.token = token;
 }
 

@@ -15,6 +15,7 @@ std::string files_json(const BakedFiles& files) {
   json out = {{"folder", files.folder}, {"files", files.names}};
   const json report = json::parse(files.report, nullptr, false);
   out["certificate"] = report.is_object() && report.contains("certificate") ? report["certificate"] : json();
+  out["warnings"] = report.is_object() && report.contains("warnings") ? report["warnings"] : json::array();
   return out.dump() + "\n";
 }
 
@@ -41,6 +42,7 @@ std::string output_folder(const std::string& output, const std::string& input) {
 Outcome<ExitCode> show_bake(const BakedFiles& files, std::optional<double> max_error, const Session& session) {
   const Outcome<void> written = write_text("", session.common.json ? files_json(files) : files_text(files));
   if (!written) return tl::make_unexpected(written.error());
+  for (const std::string& warning : report_warnings(files.report)) warn(session.terminal, warning);
   if (const std::string certificate = certificate_text(files.report); !certificate.empty()) say(certificate);
   return max_error ? check_error(files.report, *max_error) : Outcome<ExitCode>(ExitCode::ok);
 }

@@ -17,8 +17,8 @@ struct BakedFiles {
 /// The folder for a result: `output`, or the input's name without its extension and "-baked" behind it.
 std::string output_folder(const std::string& output, const std::string& input);
 
-/// Names the files on stdout (with --json: one object with folder, files and certificate), tells the certificate, and
-/// fails with target_missed when its error is above `max_error`.
+/// Names the files on stdout (with --json: one object with folder, files, certificate and warnings), tells warnings and
+/// certificate, and fails with target_missed when its error is above `max_error`.
 Outcome<ExitCode> show_bake(const BakedFiles&, std::optional<double> max_error, const Session&);
 
 }  // namespace kiln

@@ -50,9 +50,11 @@ Outcome<BakedFiles> write_artifacts(const BakeOutput& output, const std::string&
 
 Outcome<ExitCode> run(const BakeOptions& options, Session& session) {
   if (!session.common.server.empty()) return bake_remotely(options, session);
+  const std::string folder = output_folder(options.output, options.input);
+  if (const Outcome<void> usable = check_folder(folder); !usable) return tl::make_unexpected(usable.error());
   KILN_TRY(input, bake_input(options.input, options.recipe));
   KILN_TRY(output, bake_here(input, session));
-  KILN_TRY(files, write_artifacts(output, output_folder(options.output, options.input)));
+  KILN_TRY(files, write_artifacts(output, folder));
   return show_bake(files, options.max_error, session);
 }
 

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "client_cli/terminal.h"
+
 namespace kiln {
 namespace {
 
@@ -34,12 +36,6 @@ Outcome<void> check_same_points(const ValueTable& a, const ValueTable& b) {
     return fail(ExitCode::rejected, "different_points", "point " + std::to_string(i + 1) + " of A is not that of B");
   }
   return {};
-}
-
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g %%", 100 * share);
-  return text;
 }
 
 }  // namespace
@@ -73,16 +69,16 @@ Outcome<Comparison> compare_values(const ValueTable& a, const ValueTable& b, con
 
 std::string comparison_text(const Comparison& c) {
   const ErrorStats& s = c.stats;
-  std::string out = "relRMSE            " + percent(s.relrmse) + "   (95 % interval " + percent(s.interval_low) +
-                    " .. " + percent(s.interval_high) + ")\n";
-  out += "without worst 1 %  " + percent(s.relrmse_without_worst_1pct) + "\n";
-  out += "99th percentile    " + percent(s.p99) + "\n";
-  out += "maximum            " + percent(s.max) + "\n";
-  out += "bias               " + percent(s.bias) + "\n";
+  std::string out = "relRMSE            " + percent_text(s.relrmse) + "   (95 % interval " +
+                    percent_text(s.interval_low) + " .. " + percent_text(s.interval_high) + ")\n";
+  out += "without worst 1 %  " + percent_text(s.relrmse_without_worst_1pct) + "\n";
+  out += "99th percentile    " + percent_text(s.p99) + "\n";
+  out += "maximum            " + percent_text(s.max) + "\n";
+  out += "bias               " + percent_text(s.bias) + "\n";
   out += "points             " + std::to_string(s.points);
   if (c.skipped > 0) out += "   (" + std::to_string(c.skipped) + " more have no value on one side)";
   out += "\n";
-  out += c.noise_known ? "reference noise    " + percent(s.noise) + ", subtracted\n"
+  out += c.noise_known ? "reference noise    " + percent_text(s.noise) + ", subtracted\n"
                        : "reference noise    unknown, taken as none\n";
   if (s.dark_lightings > 0) out += "lit by nothing     error 0 by definition\n";
   return out;

@@ -32,8 +32,10 @@ Outcome<std::vector<std::uint8_t>> read_file(const std::string& path) {
   if (fs::is_directory(path, error)) return fail(ExitCode::error, "unreadable_file", "is a folder, not a file", path);
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ExitCode::error, "unreadable_file", "cannot be opened for reading", path);
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(fs::file_size(path, error)));
-  if (error) return read_all(in);  // a pipe has no size
+  if (!fs::is_regular_file(path, error)) return read_all(in);  // a pipe has no size
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) return fail(ExitCode::error, "unreadable_file", "cannot be read", path);
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(size));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (static_cast<std::size_t>(in.gcount()) != bytes.size())
     return fail(ExitCode::error, "unreadable_file", "ended before its size", path);
@@ -74,6 +76,14 @@ Outcome<void> make_folder(const std::string& path) {
   if (error || !fs::is_directory(path))
     return fail(ExitCode::error, "unwritable_file", "cannot be made a folder", path);
   return {};
+}
+
+Outcome<void> check_folder(const std::string& path) {
+  std::error_code error;
+  fs::path place = fs::absolute(path, error);
+  while (!error && !fs::exists(place, error) && place.has_relative_path()) place = place.parent_path();
+  if (!error && fs::is_directory(place, error) && access(place.c_str(), W_OK | X_OK) == 0) return {};
+  return fail(ExitCode::error, "unwritable_file", "cannot be made a folder", path);
 }
 
 bool file_exists(const std::string& path) {

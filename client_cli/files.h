@@ -20,6 +20,8 @@ Outcome<void> write_file(const std::string& path, std::span<const std::uint8_t> 
 Outcome<void> write_text(const std::string& path, std::string_view text);
 
 Outcome<void> make_folder(const std::string& path);
+/// Whether make_folder would do: asked before a long bake, and nothing is made.
+Outcome<void> check_folder(const std::string& path);
 bool file_exists(const std::string& path);
 
 /// The last component of a path.

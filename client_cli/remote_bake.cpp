@@ -77,6 +77,8 @@ Outcome<BakedFiles> download_all(ServerLink& link, const JobReply& job, const st
 }
 
 Outcome<ExitCode> bake_remotely(const BakeOptions& options, Session& session) {
+  const std::string folder = output_folder(options.output, options.input);
+  if (const Outcome<void> usable = check_folder(folder); !usable) return tl::make_unexpected(usable.error());
   KILN_TRY(link, ServerLink::open(session));
   KILN_TRY(input, job_input(options.input, options.recipe, options.idempotency_key));
   KILN_TRY(submitted, submit_job(link, input));
@@ -84,7 +86,7 @@ Outcome<ExitCode> bake_remotely(const BakeOptions& options, Session& session) {
   KILN_TRY(job, is_terminal(submitted) ? Outcome<JobReply>(submitted) : watch_with_bar(link, submitted.id));
   show_end(job, session);
   if (job.status != "succeeded") return exit_of_bake(job);
-  KILN_TRY(files, download_all(link, job, output_folder(options.output, options.input), ""));
+  KILN_TRY(files, download_all(link, job, folder, ""));
   return show_bake(files, options.max_error, session);
 }
 

@@ -28,12 +28,6 @@ json list_of(const json& object, const char* name) {
   return object.contains(name) && object[name].is_array() ? object[name] : json::array();
 }
 
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2g %%", 100 * share);
-  return text;
-}
-
 std::string count(double number) {
   char text[32];
   std::snprintf(text, sizeof text, "%.0f", number);
@@ -41,10 +35,11 @@ std::string count(double number) {
 }
 
 std::string error_text(const json& error) {
-  std::string out = "relRMSE " + percent(number_of(error, "relrmse"));
+  std::string out = "relRMSE " + percent_text(number_of(error, "relrmse"));
   const json interval = list_of(error, "interval");
   if (interval.size() == 2 && interval[0].is_number() && interval[1].is_number())
-    out += " (95 % interval " + percent(interval[0].get<double>()) + " .. " + percent(interval[1].get<double>()) + ")";
+    out += " (95 % interval " + percent_text(interval[0].get<double>()) + " .. " +
+           percent_text(interval[1].get<double>()) + ")";
   return out;
 }
 
@@ -54,6 +49,16 @@ std::string prediction_text(const json& plan) {
   return "predicted: " + human_seconds(number_of(p, "seconds")) + ", " + human_bytes(number_of(p, "memory_bytes")) +
          " of memory, " + human_bytes(number_of(p, "artifact_bytes")) + " of result, " +
          count(number_of(p, "triangles")) + " triangles\n";
+}
+
+std::vector<std::string> warnings_of(const json& document) {
+  std::vector<std::string> out;
+  for (const json& warning : list_of(document, "warnings")) {
+    const std::string where = text_of(warning, "where");
+    out.push_back((where.empty() ? "" : where + ": ") + text_of(warning, "message") + " [" + text_of(warning, "code") +
+                  "]");
+  }
+  return out;
 }
 
 }  // namespace
@@ -67,22 +72,21 @@ std::string plan_text(std::string_view text) {
                   text_of(decision, "value").c_str());
     out += line + text_of(decision, "reason") + "\n";
   }
-  for (const json& warning : list_of(plan, "warnings")) {
-    const std::string where = text_of(warning, "where");
-    out += "warning: " + (where.empty() ? "" : where + ": ") + text_of(warning, "message") + " [" +
-           text_of(warning, "code") + "]\n";
-  }
+  for (const std::string& warning : warnings_of(plan)) out += "warning: " + warning + "\n";
   return out + prediction_text(plan);
 }
+
+std::vector<std::string> report_warnings(std::string_view report) { return warnings_of(parsed(report)); }
 
 std::string certificate_text(std::string_view report) {
   const json document = parsed(report);
   if (!document.contains("certificate") || !document["certificate"].is_object()) return {};
   const json& certificate = document["certificate"];
   std::string out = error_text(certificate) + ", without worst 1 % " +
-                    percent(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
-                    percent(number_of(certificate, "p99")) + ", bias " + percent(number_of(certificate, "bias")) +
-                    ", at " + count(number_of(certificate, "points")) + " points";
+                    percent_text(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
+                    percent_text(number_of(certificate, "p99")) + ", bias " +
+                    percent_text(number_of(certificate, "bias")) + ", at " + count(number_of(certificate, "points")) +
+                    " points";
   if (certificate.contains("job_light") && certificate["job_light"].is_object())
     out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
   return out;

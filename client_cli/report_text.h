@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "client_cli/failure.h"
 
@@ -11,6 +12,9 @@ namespace kiln {
 
 /// The decisions of a plan with their reasons, predictions and warnings. Works for plans and reports.
 std::string plan_text(std::string_view json);
+
+/// What the input has and the bake did not honour, a sentence each.
+std::vector<std::string> report_warnings(std::string_view report_json);
 
 /// "error 1.2 % (95 % interval 1.0 .. 1.5 %), ..." of a report's certificate; empty when it has none.
 std::string certificate_text(std::string_view report_json);

@@ -90,6 +90,12 @@ std::string human_bytes(double bytes) {
   return text;
 }
 
+std::string percent_text(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, std::abs(share) < 1 ? "%.3g %%" : "%.0f %%", 100 * share);
+  return text;
+}
+
 std::string human_seconds(double seconds) {
   char text[48];
   const auto whole = static_cast<long long>(std::llround(std::max(seconds, 0.0)));

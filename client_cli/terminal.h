@@ -26,5 +26,7 @@ void show_failure(const Terminal&, const Failure&);
 std::string human_bytes(double bytes);
 /// 75 -> "1 min 15 s".
 std::string human_seconds(double seconds);
+/// "1.23 %" of .0123; whole numbers from 100 % on.
+std::string percent_text(double share);
 
 }  // namespace kiln

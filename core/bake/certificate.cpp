@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "core/artifact/evaluate.h"
@@ -109,6 +110,26 @@ double open_value(const std::vector<Vec3f>& light) {
   return (light[0].x + light[0].y + light[0].z) / 3 * 0.28209479177387814;  // Y(0,0)
 }
 
+/// The mean value there would be if all that the lamps send fell on the surface evenly; textures count as white.
+double lamp_value(const Scene& scene) {
+  const auto mean = [](const Vec3f& c) { return (double{c.x} + c.y + c.z) / 3; };
+  double sent = 0, area = 0, even = 0;
+  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) {
+    const auto part = scene.parts[scene.mesh.part[t]];
+    const double a = triangle_area(scene.mesh, scene.mesh.triangles[t]);
+    area += a;
+    sent += a * mean(scene.materials[static_cast<std::size_t>(part.material)].emission);
+  }
+  for (const Light& light : scene.lights) {
+    if (light.type == LightType::directional) {
+      even += mean(light.intensity) / std::numbers::pi;
+    } else {
+      sent += 4 * mean(light.intensity);
+    }
+  }
+  return even + (area > 0 ? sent / area : 0);
+}
+
 /// Everything known at the probed points. Index: lighting * points + point.
 struct Samples {
   std::vector<Vec3d> shown, truth, noise;
@@ -125,17 +146,17 @@ struct Samples {
 };
 
 /// The lightings that matter here; the others are named in certificate.dark.
-Samples judged_lightings(const Samples& all, const Lightings& lightings, bool lamps, Certificate& certificate) {
-  constexpr double kDark = 0.01;
+Samples judged_lightings(const Samples& all, const Lightings& lightings, double lamps, Certificate& certificate) {
+  constexpr double kDark = 0.01, kDarkLamps = 1e-4;  // a lamp's texture may be black nearly everywhere
   Samples judged;
-  const std::size_t points = certificate.points, count = lightings.sh.size() + (lamps ? 1 : 0);
+  const std::size_t points = certificate.points, count = lightings.sh.size() + (lamps > 0 ? 1 : 0);
   for (std::size_t k = 0; k < count; ++k) {
     const bool distant = k < lightings.sh.size();
     const std::string name = distant ? lightings.names[k] : "lamps";
-    const double open = distant ? open_value(lightings.sh[k]) : 0;
+    const double least = distant ? kDark * open_value(lightings.sh[k]) : kDarkLamps * lamps;
     const double seen = std::max(mean_size(std::span(all.truth).subspan(k * points, points)),
                                  mean_size(std::span(all.shown).subspan(k * points, points)));
-    if (seen <= kDark * open) {
+    if (seen <= least) {
       certificate.dark.push_back(name);
       continue;
     }
@@ -213,7 +234,8 @@ class Judge {
   }
 
   Samples judged(const Judgement& all, Certificate& certificate) const {
-    return judged_lightings(all.transport, lightings_, light_.scene_lights, certificate);
+    return judged_lightings(all.transport, lightings_, light_.scene_lights ? lamp_value(truth_.scene()) : 0,
+                            certificate);
   }
 
  private:

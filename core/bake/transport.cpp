@@ -17,8 +17,9 @@ namespace {
 /// open point.
 class DirectSource {
  public:
-  DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, Threads& threads)
+  DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads)
       : tracer_(tracer),
+        log_(log),
         sky_(tracer, {.order = plan.order, .samples = plan.samples, .seed = seed}),
         plan_(plan),
         seed_(seed),
@@ -38,6 +39,7 @@ class DirectSource {
 
   std::vector<float> operator()(std::span<const TransferPoint> batch) {
     points += batch.size();
+    log_.advance(std::min(points, expected_points()), expected_points());
     std::vector<float> sky = sky_.bake(batch, threads_, &stats);
     if (!plan_.lamps) return sky;
     const std::vector<Vec3f> lamps =
@@ -85,7 +87,13 @@ class DirectSource {
     return joined;
   }
 
+  /// Subdivision asks for three points a final triangle, unless its threshold ends it early.
+  std::uint64_t expected_points() const {
+    return plan_.split ? 3 * plan_.subdivide.triangles : tracer_.scene().mesh.position.size();
+  }
+
   const Tracer& tracer_;
+  BakeLog& log_;
   DirectTransferBaker sky_;
   const Plan& plan_;
   std::uint64_t seed_;
@@ -143,7 +151,7 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
   log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
-    DirectSource source(tracer, plan, seed, threads);
+    DirectSource source(tracer, plan, seed, log, threads);
     Direct direct = bake_direct(scene.mesh, plan, source, threads);
     source.separate(direct.columns, sky, lamps);
     log.count_rays(source.stats.rays);
@@ -155,9 +163,14 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
   log.begin("bounces", 0.85);
   const Tracer tracer(scene, threads);
   TransferStats stats;
-  Transfer transfer = bake_interreflection(
-      tracer, scene.mesh, std::move(sky), std::move(lamps),
-      {.order = plan.order, .bounces = plan.bounces, .samples = plan.bounce_samples, .seed = seed}, threads, &stats);
+  Transfer transfer =
+      bake_interreflection(tracer, scene.mesh, std::move(sky), std::move(lamps),
+                           {.order = plan.order,
+                            .bounces = plan.bounces,
+                            .samples = plan.bounce_samples,
+                            .seed = seed,
+                            .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
+                           threads, &stats);
   log.count_rays(stats.rays);
   return transfer;
 }

@@ -116,6 +116,7 @@ class Solver {
     const DirectionSets many(0, params_.samples, kSets, mix64(params_.seed));
     const DirectionSets few(0, early_samples(params_), kSets, mix64(params_.seed));
     Layer next = layer(1);
+    std::uint64_t sent = 0;
     for (int pass = 0; pass < params_.bounces; ++pass) {
       const DirectionSets& sets = pass + kLatePasses < params_.bounces ? few : many;
       const GatherSource source{tracer_,     lamps_,        faces_,        albedo_, sets,        light.rows,
@@ -128,6 +129,8 @@ class Solver {
       });
       if (stats != nullptr) stats->rays += rays;
       std::swap(light, next);
+      sent += static_cast<std::uint64_t>(sets.samples());
+      if (params_.progress) params_.progress(sent, rays_per_vertex(params_));
     }
   }
 

@@ -7,6 +7,7 @@
 // Memory  at most 600 bytes per vertex at order 6, all told (anchor of issue 2)
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct Interreflection {
   int bounces = 1;    // passes, >= 0
   int samples = 256;  // closest-hit rays per vertex in each of the last two passes; a quarter of them before
   std::uint64_t seed = 0;
+  std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // rays of a vertex, told after each pass
 };
 
 /// Rays that all passes send from one vertex.
