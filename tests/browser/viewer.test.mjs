@@ -250,6 +250,41 @@ test('the divider shows the original on its left and moves with the arrow keys',
     assert.equal(await page.evaluate(() => window.kilnViewer.state.get().compare), 0.52);
   }));
 
+test('a comparison that would be plain white is exposed less, and says so', () =>
+  withViewer('compare=0.5&light=baked&intensity=1', async (page) => {
+    await until(page, () => window.kilnViewer.comparison !== null);
+    const label = () => page.locator('.side-before').innerText();
+    assert.equal(await label(), 'Before: unshadowed light');
+    // As in a closed room: exposed for little light.
+    await page.evaluate(() => {
+      const { model, state } = window.kilnViewer;
+      model.transfer.look.exposure *= 16;
+      state.set({ mode: 'measure', ev: 1 });
+    });
+    assert.match(await label(), /exposed \d\.\d EV less/);
+    const exposure = await page.evaluate(() => window.kilnViewer.comparison.exposure);
+    assert.ok(exposure < 1 / 3 && exposure > 1 / 64, `${exposure}`);
+  }));
+
+test('the default tone map is that of the bake', () =>
+  withViewer('ev=-1', async (page) => {
+    const vertex = await pickVertex(page);
+    const part = baked.parts[kPart];
+    const light = Float32Array.from(baked.extension.light.coefficients.flat());
+    const value = valueAt(baked.extension, part, vertex.v, light);
+    const shoulder = (x) => (x <= 0.6 ? x : 1 - 0.4 * Math.exp((0.6 - x) / 0.4));
+    for (const ev of [-1, 1]) {
+      await page.evaluate((ev) => window.kilnViewer.state.set({ ev }), ev);
+      const { colour, exposure } = await readPixel(page, vertex);
+      const expected = value.map((v, c) =>
+        encode(shoulder(exposure * (part.albedoAt(vertex.v)[c] * Math.max(0, v) + part.emission[c]))),
+      );
+      colour.forEach((shown, c) =>
+        assert.ok(Math.abs(shown - expected[c]) < 0.02, `shown ${colour}, expected ${expected}`),
+      );
+    }
+  }));
+
 test('where to refine: the legend fits and the flat floor’s far corner is cold', () =>
   withViewer('mode=weighted', async (page) => {
     await until(page, () => !document.querySelector('.legend').hidden);
@@ -293,7 +328,8 @@ test('statistics show counts, certificate with interval, plan and warnings', () 
     const text = await page.locator('.statistics').innerText();
     const vertices = baked.parts.reduce((sum, part) => sum + part.vertices, 0).toLocaleString('en');
     assert.ok(text.includes(vertices), text);
-    assert.match(text, /1\.2 % relative error \(95 %: 1\.0 % to 1\.5 %\)/);
+    assert.match(text, /1\.2\s% relative error \(95\s%: 1\.0\s% to 1\.5\s%\)/);
+    assert.match(text, /Own light, in full detail\s+3\.4\s% \(95\s%: 2\.9\s% to 4\.1\s%\)/);
     assert.match(text, /order: 4 sample made in code/);
     assert.match(text, /metal_as_diffuse A metal is modelled/);
   }));

@@ -168,5 +168,6 @@ export interface Report {
     points?: number;
     samples?: number;
     lightings?: { name: string; relrmse: number }[];
+    job_light?: { relrmse: number; interval?: [number, number] }; // its own light in full detail, lamps and all
   };
 }

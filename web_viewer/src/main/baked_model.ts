@@ -6,6 +6,7 @@ import {
   type BufferGeometry,
   Color,
   DynamicDrawUsage,
+  type InterleavedBufferAttribute,
   type Material,
   type Mesh,
   type MeshBasicMaterial,
@@ -28,6 +29,7 @@ export interface BakedPart {
   mesh: Mesh<BufferGeometry, Material>;
   material: ShaderMaterial;
   light: BufferAttribute;
+  normal: BufferAttribute | InterleavedBufferAttribute; // kept here: a false-colour geometry has none
 }
 
 export class BakedModel {
@@ -64,6 +66,12 @@ export class BakedModel {
     return this.parts.reduce((sum, part) => sum + (part.mesh.geometry.index?.count ?? 0) / 3, 0);
   }
 
+  get normals(): Float32Array[] {
+    return this.parts.map(({ normal }) =>
+      Float32Array.from({ length: 3 * normal.count }, (_, i) => normal.getComponent(Math.floor(i / 3), i % 3)),
+    );
+  }
+
   /// Shows new light and gives back the arrays it replaces.
   setLight(values: Float32Array[]): Float32Array[] {
     return this.parts.map(({ light }, i) => {
@@ -94,7 +102,7 @@ export class BakedModel {
       vertexAlbedo: geometry.hasAttribute('_albedo'),
     });
     part.mesh.material = material;
-    return { mesh: part.mesh as BakedPart['mesh'], material, light };
+    return { mesh: part.mesh as BakedPart['mesh'], material, light, normal: geometry.getAttribute('normal') };
   }
 
   dispose(): void {

@@ -28,6 +28,8 @@ export interface ComparisonLight {
 
 export class Comparison {
   divider = 0.5;
+  /// The exposure of the original, as a multiple of that of the baked side.
+  exposure = 1;
   private readonly scene = new Scene();
   private readonly background = new SkyBackground();
   private readonly suns = new Group();
@@ -66,7 +68,10 @@ export class Comparison {
     const split = Math.round(this.divider * width);
     renderer.setScissorTest(true);
     renderer.setScissor(0, 0, split, height);
+    const own = renderer.toneMappingExposure;
+    renderer.toneMappingExposure = own * this.exposure;
     renderer.render(this.scene, camera);
+    renderer.toneMappingExposure = own;
     renderer.setScissor(split, 0, width - split, height);
     renderer.render(scene, camera);
     renderer.setScissorTest(false);

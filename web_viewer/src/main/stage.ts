@@ -14,9 +14,11 @@ import {
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { ShoulderToneMapping } from '../shaders/tone_map';
 import type { ToneMap } from './view_state';
 
 const kToneMappings: Record<ToneMap, ToneMapping> = {
+  baked: ShoulderToneMapping,
   neutral: NeutralToneMapping,
   aces: ACESFilmicToneMapping,
   none: LinearToneMapping, // exposure and clamping only
@@ -24,6 +26,8 @@ const kToneMappings: Record<ToneMap, ToneMapping> = {
 
 /// Camera place and target in units of the model's radius about its centre: it fits any scale, and short numbers do.
 export type CameraPose = readonly [number, number, number, number, number, number];
+
+const kPlainBackground = 0x5b5e64; // about that of preview.png
 
 export const kDefaultPose: CameraPose = [1.35, 0.95, 1.9, 0, 0, 0];
 
@@ -44,6 +48,7 @@ export class Stage {
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     this.renderer.info.autoReset = true;
+    this.renderer.setClearColor(kPlainBackground);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.mouseButtons = { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
     this.controls.addEventListener('change', () => {

@@ -136,6 +136,7 @@ function furnish(viewer: Viewer, job: Job, report: Report | null): void {
   area.append(legend.element);
   main.append(panel.element);
   viewer.onLegend = (shown) => legend.show(shown, kLegendTitles[state.get().mode] ?? '');
+  viewer.onBefore = (stops) => divider.showStops(stops);
   viewer.onFailure = (message) => toast(message, 'error');
   toolbar(viewer, job);
   turnLightByDragging(stage, state);

@@ -3,7 +3,7 @@
 
 import type { CameraPose } from './stage';
 
-export type ToneMap = 'neutral' | 'aces' | 'none';
+export type ToneMap = 'baked' | 'neutral' | 'aces' | 'none';
 export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient';
 export type Background = 'off' | 'sky' | 'harmonics';
 
@@ -29,7 +29,7 @@ export const kDefaultState: ViewState = {
   intensity: 1,
   lamps: true,
   ev: 0,
-  tone: 'neutral',
+  tone: 'baked',
   background: 'sky',
   wire: false,
   mode: 'shaded',
@@ -73,7 +73,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     intensity: number('intensity', 0, 100),
     lamps: flag('lamps'),
     ev: number('ev', -8, 8),
-    tone: one<ToneMap>('tone', ['neutral', 'aces', 'none']),
+    tone: one<ToneMap>('tone', ['baked', 'neutral', 'aces', 'none']),
     background: one<Background>('background', ['off', 'sky', 'harmonics']),
     wire: flag('wire'),
     mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient']),

@@ -2,6 +2,7 @@
 
 import type { LoadedAsset } from '../asset/load_gltf';
 import type { Relighter } from '../light/relighter';
+import { unshadowedLevel } from '../light/unshadowed';
 import { SkyBackground } from '../shaders/sky_background';
 import { BakedModel } from './baked_model';
 import { Comparison } from './comparison';
@@ -16,9 +17,16 @@ import { Wireframe } from './wireframe';
 /// What the legend shows.
 export type Legend = Pick<HeatMapData, 'map' | 'range'> | null;
 
+const kWellExposed = 0.877; // the bake's tone map shows it as 0.8 of white: its own target for bright surfaces
+const kOverexposed = 3 * kWellExposed;
+
+const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light';
+
 export class Viewer {
   readonly lights: Lights;
   onLegend: (legend: Legend) => void = () => {};
+  /// Told by how many stops the original is exposed less than the baked side; 0 when they are exposed alike.
+  onBefore: (stops: number) => void = () => {};
   onFailure: (message: string) => void = () => {};
   /// Called when the list of lights has grown.
   onLights: () => void = () => {};
@@ -82,7 +90,7 @@ export class Viewer {
     if (has('mode', 'channel', 'slot')) void this.showMode(state);
     if (has('wire')) this.showWire(state.wire);
     if (has('compare')) void this.compare(state.compare);
-    if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare')) this.showSky();
+    if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare', 'mode')) this.showSky();
     this.stage.requestDraw();
   }
 
@@ -119,7 +127,18 @@ export class Viewer {
     const { light, ev, tone } = this.state.get();
     const [baked, now] = [this.lights.levels.get('baked') ?? 0, this.lights.levels.get(light) ?? 0];
     const ratio = light !== 'baked' && baked > 0 && now > 0 ? baked / now : 1;
-    this.stage.setLook((this.model.transfer.look?.exposure ?? 1) * ratio * 2 ** ev, tone);
+    const exposure = (this.model.transfer.look?.exposure ?? 1) * ratio;
+    this.exposeComparison(light, exposure);
+    this.stage.setLook(exposure * 2 ** ev, tone);
+  }
+
+  /// Without shadows a closed room is as bright as the open sky: at the exposure of the baked side it would be plain white.
+  private exposeComparison(light: string, exposure: number): void {
+    if (!this.comparison) return;
+    const before = exposure * unshadowedLevel(this.lights.coefficients(light), this.model.normals);
+    const ratio = before > kOverexposed ? kWellExposed / before : 1;
+    this.comparison.exposure = ratio;
+    this.onBefore(-Math.log2(ratio));
   }
 
   private async relightOnce(): Promise<void> {
@@ -132,9 +151,8 @@ export class Viewer {
 
   private async showMode({ mode, channel, slot }: Readonly<ViewState>): Promise<void> {
     const serial = ++this.heatSerial;
-    const plain = mode === 'shaded' || mode === 'light';
     try {
-      const data = plain ? null : await this.heatData(mode, channel, slot);
+      const data = isFalseColour(mode) ? await this.heatData(mode, channel, slot) : null;
       if (serial !== this.heatSerial || this.disposed) return;
       this.heatMap?.dispose();
       this.heatMap = data && new HeatMap(this.model, data);
@@ -184,15 +202,16 @@ export class Viewer {
       this.comparison = new Comparison(this.stage, original);
       this.comparison.divider = this.state.get().compare ?? 0.5;
       this.showSky();
-      this.stage.requestDraw();
+      this.setLook();
     } catch (error) {
       this.fail(error);
     }
   }
 
   private showSky(): void {
-    const { light, background, rotation, intensity, lamps } = this.state.get();
-    const shown = background === 'off' ? null : this.pictures.background(light, background === 'harmonics');
+    const { light, background, rotation, intensity, lamps, mode } = this.state.get();
+    const plain = background === 'off' || (isFalseColour(mode) && !this.comparison); // a scale is read against grey
+    const shown = plain ? null : this.pictures.background(light, background === 'harmonics');
     this.background.show(shown, rotation, intensity);
     if (this.comparison)
       this.comparison.setLight({ ...this.pictures.reflection(light), background: shown, rotation, intensity, lamps });

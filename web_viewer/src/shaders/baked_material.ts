@@ -56,6 +56,8 @@ varying vec2 vAlbedoUv;
 uniform sampler2D emissionMap;
 varying vec2 vEmissionUv;
 #endif
+#include <common>
+#include <dithering_pars_fragment>
 
 void main() {
 #ifdef VERTEX_ALBEDO
@@ -76,6 +78,7 @@ void main() {
   gl_FragColor = vec4(white ? value : base.rgb * value + emitted, base.a);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
+  #include <dithering_fragment>
 }`;
 
 /// Emission through a texture, which the extension leaves to the original material.
@@ -110,6 +113,7 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo }: B
   if (albedoMap?.channel === 1 || emissionMap?.channel === 1) defines.USE_UV1_SET = '';
   return new ShaderMaterial({
     name: unlit.name,
+    dithering: true, // soft shadows show bands in 8 bits
     vertexShader,
     fragmentShader,
     defines,

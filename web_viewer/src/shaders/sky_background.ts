@@ -25,6 +25,8 @@ uniform sampler2D sky;
 uniform float rotation;  // radians about +Y, +Z towards +X
 uniform float intensity;
 varying vec3 vDirection;
+#include <common>
+#include <dithering_pars_fragment>
 void main() {
   vec3 w = normalize(vDirection);
   float c = cos(rotation), s = sin(rotation);
@@ -33,6 +35,7 @@ void main() {
   gl_FragColor = vec4(max(vec3(0.0), intensity * textureLod(sky, uv, 0.0).rgb), 1.0);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
+  #include <dithering_fragment>
 }`;
 
 /// Owns its triangle and material, not the texture it shows.
@@ -40,6 +43,7 @@ export class SkyBackground {
   private readonly material = new ShaderMaterial({
     vertexShader,
     fragmentShader,
+    dithering: true, // a sky changes slowly: 8 bits alone show as bands
     depthTest: false,
     depthWrite: false,
     uniforms: {

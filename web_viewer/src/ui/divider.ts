@@ -36,6 +36,12 @@ export class Divider {
     this.show();
   }
 
+  /// `stops`: how much less the left side is exposed.
+  showStops(stops: number): void {
+    const exposed = stops > 0 ? `, exposed ${stops.toFixed(1)} EV less` : '';
+    this.before.textContent = `Before: unshadowed light${exposed}`;
+  }
+
   private moveTo(clientX: number): void {
     const { left, width } = this.area.getBoundingClientRect();
     this.set((clientX - left) / width);

@@ -14,7 +14,7 @@ export const count = (value: number | undefined): string =>
 export const percent = (fraction: number | undefined): string =>
   fraction === undefined || !Number.isFinite(fraction)
     ? '–'
-    : `${(100 * fraction).toPrecision(fraction < 0.1 ? 2 : 3)} %`;
+    : `${(100 * fraction).toPrecision(fraction < 0.1 ? 2 : 3)}\u00a0%`;
 
 export function seconds(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return '–';

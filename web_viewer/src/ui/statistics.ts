@@ -34,19 +34,25 @@ function sizes({ model, asset }: Viewer): Row[] {
   ];
 }
 
+const interval = (ends?: readonly [number, number]): string =>
+  ends ? ` (95\u00a0%: ${percent(ends[0])} to ${percent(ends[1])})` : '';
+
+const withInterval = (c: { relrmse: number; interval?: [number, number] }): string =>
+  percent(c.relrmse) + interval(c.interval);
+
 function certificate(c: NonNullable<Report['certificate']>): HTMLElement {
-  const interval = c.interval ? ` (95 %: ${percent(c.interval[0])} to ${percent(c.interval[1])})` : '';
   const rows: Row[] = [
+    ...(c.job_light ? [['Own light, in full detail', withInterval(c.job_light)] as const] : []),
     ['Without worst 1 %', percent(c.relrmse_without_worst_1pct)],
     ['99th percentile', percent(c.p99)],
-    ['Bias', c.bias === undefined ? '–' : `${(100 * c.bias).toFixed(2)} %`],
+    ['Bias', c.bias === undefined ? '–' : `${(100 * c.bias).toFixed(2).replace('-', '−')}\u00a0%`],
     ['Measured at', `${count(c.points)} points, ${count(c.samples)} paths each`],
     ...(c.lightings ?? []).map((l): Row => [`under ${l.name}`, percent(l.relrmse)]),
   ];
   return h(
     'div',
     {},
-    h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval}`),
+    h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval(c.interval)}`),
     pairs(rows),
   );
 }

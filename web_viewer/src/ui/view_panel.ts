@@ -53,6 +53,7 @@ export class ViewPanel {
 
   private look(): HTMLElement[] {
     const tones = [
+      { id: 'baked', label: 'As baked, soft shoulder' },
       { id: 'neutral', label: 'Khronos PBR Neutral' },
       { id: 'aces', label: 'ACES filmic' },
       { id: 'none', label: 'None, clamped' },
