@@ -97,7 +97,7 @@ class TermWatch {
         }) {}
   ~TermWatch() {
     over_ = true;
-    ::pthread_kill(thread_.native_handle(), SIGTERM);
+    ::pthread_kill(thread_.native_handle(), SIGTERM);  // NOLINT(bugprone-bad-signal-to-kill-thread): ends its sigwait
     thread_.join();
   }
   TermWatch(const TermWatch&) = delete;
