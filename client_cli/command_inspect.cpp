@@ -37,7 +37,7 @@ json scene_facts(const Scene& scene) {
 
 /// The meshes of the scene that viewers show; an artefact has its geometry a second time with the original materials.
 json shown_meshes(const json& gltf) {
-  const json meshes = gltf.value("meshes", json::array());
+  json meshes = gltf.value("meshes", json::array());
   if (!gltf.contains("scenes") || gltf["scenes"].size() < 2) return meshes;
   json shown = json::array();
   for (const json& node : gltf["scenes"][0].value("nodes", json::array())) {
