@@ -36,7 +36,7 @@ Outcome<JobInput> job_input(const std::string& input, const RecipeOptions& optio
 
 Outcome<JobReply> watch_with_bar(ServerLink& link, const std::string& id) {
   ProgressBar bar(link.session().terminal);
-  const auto job = watch_job(link, id, [&](const ServerEvent& event) { show_event(event, bar); });
+  auto job = watch_job(link, id, [&](const ServerEvent& event) { show_event(event, bar); });
   bar.clear();
   if (!job && job.error().exit == ExitCode::interrupted) {
     say("detached; job " + id + " goes on");
