@@ -30,7 +30,7 @@ std::vector<PartMesh> split_by_part(const Scene& scene) {
   for (PartMesh& part : out) {
     for (const Triangle& t : part.triangles) part.vertices.insert(part.vertices.end(), t.begin(), t.end());
     std::ranges::sort(part.vertices);
-    part.vertices.erase(std::ranges::unique(part.vertices).begin(), part.vertices.end());
+    part.vertices.erase(std::unique(part.vertices.begin(), part.vertices.end()), part.vertices.end());
     for (std::size_t i = 0; i < part.vertices.size(); ++i) number[part.vertices[i]] = static_cast<std::uint32_t>(i);
     for (Triangle& t : part.triangles) t = {number[t[0]], number[t[1]], number[t[2]]};
   }
