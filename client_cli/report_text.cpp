@@ -87,6 +87,9 @@ std::string certificate_text(std::string_view report) {
                     percent_text(number_of(certificate, "p99")) + ", bias " +
                     percent_text(number_of(certificate, "bias")) + ", at " + count(number_of(certificate, "points")) +
                     " points";
+  if (certificate.contains("seen") && certificate["seen"].is_object())
+    out += "\nwhere it can be seen (" + count(number_of(certificate["seen"], "points")) +
+           " points): " + error_text(certificate["seen"]);
   if (certificate.contains("job_light") && certificate["job_light"].is_object())
     out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
   return out;

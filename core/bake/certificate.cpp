@@ -11,6 +11,7 @@
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
+#include "core/prt/hidden.h"
 #include "core/trace/reference.h"
 
 namespace kiln {
@@ -170,6 +171,25 @@ ErrorStats statistics(const Samples& samples, std::size_t points, std::uint64_t 
   return compute_error({samples.shown, samples.truth, samples.noise, points}, {.seed = seed});
 }
 
+/// The same samples at some of the points only.
+Samples at_points(const Samples& all, const std::vector<std::size_t>& chosen, std::size_t points) {
+  Samples out;
+  for (std::size_t first = 0; first < all.truth.size(); first += points) {
+    for (const std::size_t p : chosen) out.append(all, first + p, 1);
+  }
+  return out;
+}
+
+std::vector<std::size_t> seen_points(const Tracer& truth, const std::vector<ReferencePoint>& points) {
+  const HiddenTest hidden = hidden_test(truth);
+  std::vector<std::size_t> seen;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto& [position, normal, face_normal] = points[i];
+    if (!hidden({position, normal, position, face_normal})) seen.push_back(i);
+  }
+  return seen;
+}
+
 /// What a run of the reference at some points tells.
 struct Judgement {
   Samples transport;  // of all lightings
@@ -293,7 +313,10 @@ Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::o
   out.points = many.truth.size();
   out.samples = spending.samples;
   const Judgement all = judge.judge(many, spending.samples, seed);
-  out.transport = statistics(judge.judged(all, out), out.points, options.seed);
+  const Samples transport = judge.judged(all, out);
+  out.transport = statistics(transport, out.points, options.seed);
+  if (const auto seen = seen_points(truth, many.truth); seen.size() < out.points)
+    out.seen = statistics(at_points(transport, seen, out.points), seen.size(), options.seed);
   if (!all.job_light.truth.empty()) out.job_light = statistics(all.job_light, out.points, options.seed);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return out;

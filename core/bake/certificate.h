@@ -9,6 +9,8 @@
 //                  error.
 // Job light The artefact as the job lights it against that light in full detail, lamps and all: what `kiln eval` and
 //           `kiln reference` show. It adds what the order cannot hold of a sharp sky.
+// Seen      Points inside solids count (the artefact has light to tell there, and truth is black), but nobody sees them
+//           (core/prt/hidden.h): the transport error of the others is given besides.
 // Spending  A pilot tells the error and the reference's noise. Paths are as many as keep that noise below the error;
 //           what they leave of the budget goes into more points, since the interval hangs on a few bad ones.
 // Never changes the artefact.   Repeat  same numbers for any thread count.
@@ -35,6 +37,7 @@ struct Certificate {
   ErrorStats transport;
   std::vector<std::string> lightings;   // names, in the order of transport.by_lighting
   std::vector<std::string> dark;        // lightings that hardly reach the surface: not judged
+  std::optional<ErrorStats> seen;       // transport at the points that can be seen, when some cannot
   std::optional<ErrorStats> job_light;  // when the job has any
   std::size_t points = 0;               // matched on the input surface
   int samples = 0;                      // paths per point

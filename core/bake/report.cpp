@@ -70,6 +70,10 @@ ordered_json certificate_object(const std::optional<Certificate>& certificate) {
         {{"name", certificate->lightings[i]}, {"relrmse", certificate->transport.by_lighting[i]}});
   }
   out["dark"] = certificate->dark;
+  if (certificate->seen) {
+    out["seen"] = error_object(*certificate->seen);
+    out["seen"]["points"] = certificate->seen->points;
+  }
   if (certificate->job_light) out["job_light"] = error_object(*certificate->job_light);
   out["seconds"] = certificate->seconds;
   return out;

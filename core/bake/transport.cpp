@@ -32,7 +32,8 @@ class DirectSource {
 
   /// Lamp light and the constant band stay within what was sampled: no vertex is darker than black.
   ValueSource source() {
-    ValueSource s{.width = width(), .values = std::ref(*this), .bounded = {lamp_columns()}};
+    ValueSource s{
+        .width = width(), .values = std::ref(*this), .bounded = {lamp_columns()}, .hidden = hidden_test(tracer_)};
     if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
     return s;
   }
@@ -101,12 +102,6 @@ class DirectSource {
   float lamp_scale_;
 };
 
-/// The mesh to light and the joined columns of direct light at its vertices.
-struct Direct {
-  Mesh mesh;
-  std::vector<float> columns;
-};
-
 /// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
 /// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
 /// triangle's perimeter.
@@ -127,11 +122,11 @@ Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
       .mesh;
 }
 
-Direct bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
-  if (!plan.split) return {mesh, source(vertex_points(mesh))};
+/// The mesh to light and the joined columns of direct light at its vertices.
+Subdivided bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
+  if (!plan.split) return subdivide(mesh, source.source(), {.triangles = 0}, threads);
   const Mesh base = plan.bounces > 0 ? refine_base(mesh, plan, threads) : mesh;
-  Subdivided refined = subdivide(base, source.source(), plan.subdivide, threads);
-  return {std::move(refined.mesh), std::move(refined.values)};
+  return subdivide(base, source.source(), plan.subdivide, threads);
 }
 
 void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
@@ -149,11 +144,13 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
   std::vector<float> sky;
   std::vector<Vec3f> lamps;
   log.begin("transfer", 0.55);
+  std::vector<StandIn> stand_ins;
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
     DirectSource source(tracer, plan, seed, log, threads);
-    Direct direct = bake_direct(scene.mesh, plan, source, threads);
-    source.separate(direct.columns, sky, lamps);
+    Subdivided direct = bake_direct(scene.mesh, plan, source, threads);
+    source.separate(direct.values, sky, lamps);
+    stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats.rays);
     skip_bounces_of_open_scene(plan, source);
     return std::move(direct.mesh);
@@ -169,6 +166,7 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
                             .bounces = plan.bounces,
                             .samples = plan.bounce_samples,
                             .seed = seed,
+                            .stand_ins = std::move(stand_ins),
                             .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
                            threads, &stats);
   log.count_rays(stats.rays);

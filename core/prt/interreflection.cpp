@@ -138,12 +138,18 @@ class Solver {
     Row row = direct_row(v);
     Vec3f fixed = fixed_at(v);
     if (sees_surfaces_[v]) {
-      gatherer.gather(vertex_point(mesh_, v, face_of_[v]));
+      gatherer.gather(point_of(v));
       const std::span<const float> reflected = gatherer.result();
       for (std::size_t i = 0; i < reflected.size(); ++i) row[i] += reflected[i];
       fixed += gatherer.fixed();
     }
     store(next, v, row, fixed, pass + 1 < params_.bounces);
+  }
+
+  TransferPoint point_of(std::uint32_t v) const {
+    const auto found = std::ranges::lower_bound(params_.stand_ins, v, {}, &StandIn::vertex);
+    if (found != params_.stand_ins.end() && found->vertex == v) return found->point;
+    return vertex_point(mesh_, v, face_of_[v]);
   }
 
   // Packed rows become coefficients in place: a vertex's place ends before the rows of the next.

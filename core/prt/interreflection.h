@@ -13,6 +13,7 @@
 
 #include "core/base/threads.h"
 #include "core/prt/direct_transfer.h"
+#include "core/prt/hidden.h"
 #include "core/prt/transfer.h"
 #include "core/trace/tracer.h"
 
@@ -23,6 +24,7 @@ struct Interreflection {
   int bounces = 1;    // passes, >= 0
   int samples = 256;  // closest-hit rays per vertex in each of the last two passes; a quarter of them before
   std::uint64_t seed = 0;
+  std::vector<StandIn> stand_ins = {};  // where hidden vertices gather instead; ascending
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // rays of a vertex, told after each pass
 };
 

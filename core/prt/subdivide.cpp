@@ -64,6 +64,7 @@ class Subdivider {
     evaluate(mesh_->take_new_points());
     mesh_.reset();  // its tables are not wanted any more; the fit needs the room
     Subdivided result;
+    result.stand_ins = stand_in(closed, threads);
     if (params_.measure == SplitMeasure::residual) {
       result.values = fit_vertices(closed, std::move(rows_), source_.bounded, threads);
     } else {
@@ -79,6 +80,48 @@ class Subdivider {
   }
 
  private:
+  /// Gives hidden vertices the rows of their stand-ins, and takes back what hidden middles said.
+  std::vector<StandIn> stand_in(ClosedMesh& closed, Threads& threads) {
+    if (!source_.hidden) return {};
+    std::vector<bool> dark;
+    for (const std::uint32_t point : closed.point) dark.push_back(is_dark(point));
+    std::vector<StandIn> found = find_stand_ins(closed.mesh, dark, source_.hidden, threads);
+    std::vector<TransferPoint> points;
+    for (const StandIn& s : found) {
+      closed.point[s.vertex] = static_cast<std::uint32_t>(rows_.size() + points.size());
+      points.push_back(s.point);
+    }
+    evaluate(points);
+    drop_hidden_middles(closed, threads);
+    return found;
+  }
+
+  void drop_hidden_middles(ClosedMesh& closed, Threads& threads) const {
+    const auto suspect = [&](const EdgeSample& s) {  // between two dark vertices it does no harm
+      return is_dark(s.point) && !(is_dark(closed.point[s.a]) && is_dark(closed.point[s.b]));
+    };
+    std::vector<MeshEdge> edges;
+    for (const EdgeSample& s : closed.samples) {
+      if (suspect(s)) edges.push_back({std::min(s.a, s.b), std::max(s.a, s.b)});
+    }
+    std::ranges::sort(edges);
+    const std::vector<bool> hidden = hidden_middles(closed.mesh, edges, source_.hidden, threads);
+    std::erase_if(closed.samples, [&](const EdgeSample& s) {
+      if (!suspect(s)) return false;
+      const auto at = std::ranges::lower_bound(edges, MeshEdge{std::min(s.a, s.b), std::max(s.a, s.b)});
+      return bool{hidden[static_cast<std::size_t>(at - edges.begin())]};
+    });
+  }
+
+  bool is_dark(std::uint32_t point) const {
+    std::array<float, RowStore::kFour> y{};
+    for (std::size_t four = 0; four < rows_.fours(); ++four) {
+      rows_.load_four(point, four, y.data());
+      if (std::ranges::any_of(y, [](float value) { return value != 0; })) return false;
+    }
+    return true;
+  }
+
   std::vector<float> call_source(std::span<const TransferPoint> points) {
     if (points.empty()) return {};
     std::vector<float> values = source_.values(points);
@@ -198,16 +241,35 @@ class Subdivider {
   std::uint64_t evaluated_ = 0;
 };
 
+/// The input with a value at each vertex.
+Subdivided sample_vertices(const Mesh& input, const ValueSource& source, Threads& threads) {
+  Subdivided out{input, {}, std::vector<std::uint8_t>(input.triangles.size(), 0)};
+  const std::vector<TransferPoint> points = vertex_points(input);
+  const auto evaluate = [&](const std::vector<TransferPoint>& at) {
+    out.evaluated += at.size();
+    return at.empty() ? std::vector<float>{} : source.values(at);
+  };
+  out.values = evaluate(points);
+  if (!source.hidden) return out;
+
+  out.stand_ins = find_stand_ins(input, {}, source.hidden, threads);
+  std::vector<TransferPoint> moved;
+  for (const StandIn& s : out.stand_ins) moved.push_back(s.point);
+  const std::vector<float> values = evaluate(moved);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    std::copy_n(values.data() + i * source.width, source.width,
+                out.values.data() + out.stand_ins[i].vertex * source.width);
+  }
+  return out;
+}
+
 }  // namespace
 
 Subdivided subdivide(const Mesh& input, const ValueSource& source, const Subdivide& params, Threads& threads) {
   EXPECTS(source.width > 0);
   EXPECTS(params.max_depth >= 0 && params.max_depth <= kMaxSplitDepth);
-  if (params.triangles <= input.triangles.size() || params.max_depth == 0) {
-    const std::vector<TransferPoint> points = vertex_points(input);
-    return {input, points.empty() ? std::vector<float>{} : source.values(points),
-            std::vector<std::uint8_t>(input.triangles.size(), 0), points.size()};
-  }
+  if (params.triangles <= input.triangles.size() || params.max_depth == 0)
+    return sample_vertices(input, source, threads);
   Subdivider subdivider(input, source, params, threads);
   subdivider.run(threads);
   return subdivider.finish(input.position.size(), threads);

@@ -1,0 +1,170 @@
+#include "core/prt/hidden.h"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+#include "core/mesh/topology.h"
+#include "core/prt/ray_origin.h"
+
+namespace kiln {
+namespace {
+
+constexpr int kDirections = 64;
+constexpr int kBisections = 12;  // the place is found to a 4096th of the edge
+
+/// Whether ray `lane` ends on the back of a single-sided face.
+bool ends_on_back(const Scene& scene, const Hits16& hits, const Rays16& rays, std::size_t lane) {
+  const std::uint32_t triangle = hits.triangle[lane];
+  if (triangle == kNoHit) return false;
+  const auto part = scene.parts[scene.mesh.part[triangle]];
+  if (scene.materials[static_cast<std::size_t>(part.material)].double_sided) return false;
+  return dot(area_vector(scene.mesh, scene.mesh.triangles[triangle]),
+             Vec3f{rays.dx[lane], rays.dy[lane], rays.dz[lane]}) > 0;
+}
+
+/// Fibonacci points on the hemisphere over +Z, near enough to uniform.
+std::array<Vec3f, kDirections> hemisphere() {
+  std::array<Vec3f, kDirections> out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double z = (static_cast<double>(i) + 0.5) / kDirections, r = std::sqrt(1 - z * z);
+    const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0));
+    out[i] = to_float(Vec3d{r * std::cos(turn), r * std::sin(turn), z});
+  }
+  return out;
+}
+
+bool is_hidden(const Tracer& tracer, const std::array<Vec3f, kDirections>& directions, const TransferPoint& p) {
+  const Vec3f origin = ray_origin(p);
+  const Basis<float> basis = basis_around(p.normal);
+  Rays16 rays;
+  Hits16 hits;
+  rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
+  for (std::size_t packet = 0; packet < kDirections; packet += kPacket) {
+    for (std::size_t lane = 0; lane < kPacket; ++lane) {
+      // Neighbours in the list differ in height only: a packet takes every fourth, the whole hemisphere.
+      const Vec3f w = basis.to_world(directions[(lane * kDirections / kPacket) + packet / kPacket]);
+      rays.dx[lane] = w.x, rays.dy[lane] = w.y, rays.dz[lane] = w.z;
+    }
+    tracer.closest16(rays, hits);
+    for (std::size_t lane = 0; lane < kPacket; ++lane) {
+      if (!ends_on_back(tracer.scene(), hits, rays, lane)) return false;
+    }
+  }
+  return true;
+}
+
+/// An edge from a seen vertex to a hidden one, on one of its faces.
+struct Crossing {
+  std::uint32_t seen, hidden, triangle;
+};
+
+TransferPoint point_between(const Mesh& mesh, const Crossing& edge, float share) {
+  const Triangle& t = mesh.triangles[edge.triangle];
+  const Vec3f& a = mesh.position[edge.seen];
+  const Vec3f& b = mesh.position[edge.hidden];
+  const Vec3f normal =
+      normalized(mesh.normal[edge.seen] * (1 - share) + mesh.normal[edge.hidden] * share, mesh.normal[edge.seen]);
+  return {.position = a + (b - a) * share,
+          .normal = normal,
+          .inward = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F,
+          .face_normal = normalized(area_vector(mesh, t), normal)};
+}
+
+struct Candidate {
+  StandIn stand_in;
+  float distance;  // to the vertex
+};
+
+Candidate last_seen(const Mesh& mesh, const Crossing& edge, const HiddenTest& hidden) {
+  float seen = 0, dark = 1;
+  for (int i = 0; i < kBisections; ++i) {
+    const float half = 0.5F * (seen + dark);
+    (hidden(point_between(mesh, edge, half)) ? dark : seen) = half;
+  }
+  const TransferPoint point = point_between(mesh, edge, seen);
+  return {{edge.hidden, point}, length(mesh.position[edge.hidden] - point.position)};
+}
+
+/// Verdicts on a list of points.
+std::vector<bool> test_all(const std::vector<TransferPoint>& points, const HiddenTest& test, Threads& threads) {
+  constexpr std::size_t kBlock = 64;
+  std::vector<char> verdict(points.size());
+  threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) verdict[i] = test(points[i]) ? 1 : 0;
+  });
+  return {verdict.begin(), verdict.end()};
+}
+
+/// Calls f(a, b, triangle) for both directions of each edge of each triangle.
+template <class F>
+void for_edges(const Mesh& mesh, const F& f) {
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& corner = mesh.triangles[t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      f(corner[k], corner[(k + 1) % 3], t);
+      f(corner[(k + 1) % 3], corner[k], t);
+    }
+  }
+}
+
+std::vector<Candidate> from_crossings(const Mesh& mesh, const std::vector<bool>& hidden, const HiddenTest& test,
+                                      Threads& threads) {
+  std::vector<Crossing> crossings;
+  for_edges(mesh, [&](std::uint32_t a, std::uint32_t b, std::uint32_t t) {
+    if (!hidden[a] && hidden[b]) crossings.push_back({a, b, t});
+  });
+  std::vector<Candidate> found(crossings.size());
+  threads.for_blocks(crossings.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) found[i] = last_seen(mesh, crossings[i], test);
+  });
+  return found;
+}
+
+}  // namespace
+
+HiddenTest hidden_test(const Tracer& tracer) {
+  return [&tracer, directions = hemisphere()](const TransferPoint& p) { return is_hidden(tracer, directions, p); };
+}
+
+std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& dark, const HiddenTest& test,
+                                    Threads& threads) {
+  const std::vector<TransferPoint> points = vertex_points(mesh);
+  const std::vector<bool> hidden = test_all(points, test, threads);
+  std::vector<Candidate> found = from_crossings(mesh, hidden, test, threads);
+  if (!dark.empty()) {
+    for_edges(mesh, [&](std::uint32_t a, std::uint32_t b, std::uint32_t) {
+      if (dark[a] && !hidden[a] && !dark[b]) found.push_back({{a, points[a]}, 0});
+    });
+  }
+  std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) {
+    return a.stand_in.vertex != b.stand_in.vertex ? a.stand_in.vertex < b.stand_in.vertex : a.distance < b.distance;
+  });
+  std::vector<StandIn> out;
+  for (const Candidate& c : found) {
+    if (out.empty() || out.back().vertex != c.stand_in.vertex) out.push_back(c.stand_in);
+  }
+  return out;
+}
+
+std::vector<bool> hidden_middles(const Mesh& mesh, const std::vector<MeshEdge>& edges, const HiddenTest& test,
+                                 Threads& threads) {
+  std::vector<std::size_t> edge_of;
+  std::vector<TransferPoint> points;
+  for_edges(mesh, [&](std::uint32_t a, std::uint32_t b, std::uint32_t t) {
+    if (a > b) return;
+    const MeshEdge edge{a, b};
+    const auto at = std::ranges::lower_bound(edges, edge);
+    if (at == edges.end() || *at != edge) return;
+    edge_of.push_back(static_cast<std::size_t>(at - edges.begin()));
+    points.push_back(point_between(mesh, {a, b, t}, 0.5F));
+  });
+  const std::vector<bool> hidden = test_all(points, test, threads);
+  std::vector<bool> out(edges.size(), false);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (hidden[i]) out[edge_of[i]] = true;
+  }
+  return out;
+}
+
+}  // namespace kiln
