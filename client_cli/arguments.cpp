@@ -63,7 +63,13 @@ void add_recipe(CLI::App* parser, RecipeOptions& recipe) {
       ->excludes(file);
   add_light(parser, recipe.light, kLightHelp + std::string("; instead of the recipe's"));
   parser->add_option("--label", recipe.label, "a name to find the job by")->type_name("TEXT");
-  parser->add_option("--quality", recipe.quality, "draft, standard or final")->type_name("WORD");
+  auto* quality = parser->add_option("--quality", recipe.quality, "draft, standard or final")->type_name("WORD");
+  parser->add_option("--target-error", recipe.target_error, "bake until the certificate proves this relRMSE, as 0.02")
+      ->type_name("X")
+      ->excludes(quality);
+  parser->add_option("--time-budget", recipe.time_budget_s, "spend this long; with a target, whichever comes first")
+      ->type_name("SECONDS")
+      ->excludes(quality);
   parser->add_option("--seed", recipe.seed, "of all random numbers")->type_name("N");
   parser->add_option("--threads", recipe.threads, "0: all")->type_name("N")->check(CLI::Range(0, 1024));
 }

@@ -44,6 +44,8 @@ Outcome<ExitCode> show_bake(const BakedFiles& files, std::optional<double> max_e
   if (!written) return tl::make_unexpected(written.error());
   for (const std::string& warning : report_warnings(files.report)) warn(session.terminal, warning);
   if (const std::string certificate = certificate_text(files.report); !certificate.empty()) say(certificate);
+  if (const std::string promise = promise_text(files.report); !promise.empty()) say(promise);
+  if (!promise_kept(files.report)) return ExitCode::target_missed;
   return max_error ? check_error(files.report, *max_error) : Outcome<ExitCode>(ExitCode::ok);
 }
 

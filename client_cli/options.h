@@ -27,6 +27,7 @@ struct RecipeOptions {
   std::string file, preset;
   LightOptions light;
   std::string label, quality;
+  std::optional<double> target_error, time_budget_s;  // instead of a quality
   std::optional<std::uint64_t> seed;
   std::optional<int> threads;
   bool force = false;

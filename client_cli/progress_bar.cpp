@@ -70,6 +70,7 @@ void ProgressBar::update(const ProgressEvent& event) {
   progress.done = event.done;
   progress.total = event.total;
   progress.fraction = event.fraction;
+  progress.error = event.error;
   update(progress);
 }
 

@@ -84,9 +84,23 @@ Outcome<json> recipe_of_preset(const std::string& name, bool remote) {
 void apply_words(const RecipeOptions& options, json& document) {
   if (!options.label.empty()) document["label"] = options.label;
   if (!options.quality.empty()) document["quality"] = options.quality;
+  if (options.target_error || options.time_budget_s) document["quality"] = json::object();
+  if (options.target_error) document["quality"]["target_error"] = *options.target_error;
+  if (options.time_budget_s) document["quality"]["time_budget_s"] = *options.time_budget_s;
   if (options.seed) document["seed"] = *options.seed;
   if (options.threads) document["limits"]["threads"] = *options.threads;
   if (options.force) document["force"] = true;
+}
+
+/// A missing file does not hide what else is wrong with a recipe.
+Failure with_other_mistakes(const json& document, Failure missing) {
+  json checked = document;
+  checked.erase("force");
+  auto recipe = parse_recipe(checked.dump(-1, ' ', false, json::error_handler_t::replace));
+  if (recipe) return missing;
+  std::vector<FieldError> all = std::move(recipe.error());
+  all.push_back({"/environment/file", missing.problem.detail, document["environment"]["file"].dump(), ""});
+  return failure_of(std::move(all));
 }
 
 /// Reads the environment file, if there is one, and puts its hash in its place.
@@ -95,8 +109,9 @@ Outcome<LoadedRecipe> with_environment(json document) {
   json* environment = document.contains("environment") ? &document["environment"] : nullptr;
   if (environment && environment->is_object() && environment->contains("file") && (*environment)["file"].is_string()) {
     const auto path = (*environment)["file"].get<std::string>();
-    KILN_TRY(bytes, read_file(path));
-    loaded.environment = std::move(bytes);
+    Outcome<Bytes> bytes = read_file(path);
+    if (!bytes) return tl::make_unexpected(with_other_mistakes(document, std::move(bytes.error())));
+    loaded.environment = std::move(*bytes);
     loaded.environment_name = base_name(path);
     environment->erase("file");
     (*environment)["asset"] = sha256_hex(loaded.environment);

@@ -95,6 +95,26 @@ std::string certificate_text(std::string_view report) {
   return out;
 }
 
+std::string promise_text(std::string_view report) {
+  const json document = parsed(report);
+  if (!document.contains("promise") || !document["promise"].is_object()) return {};
+  const json& promise = document["promise"];
+  std::string out = text_of(promise, "reason") + " (" + count(static_cast<double>(list_of(promise, "passes").size())) +
+                    " passes, " + human_seconds(number_of(document, "seconds")) + ")";
+  if (!document.contains("error_sources")) return out;
+  const json& sources = document["error_sources"];
+  out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + ", interpolation " +
+         percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
+         percent_text(number_of(sources, "bounce_tail")) + ", quantisation " +
+         percent_text(number_of(sources, "quantisation"));
+  return out;
+}
+
+bool promise_kept(std::string_view report) {
+  const json document = parsed(report);
+  return !document.contains("promise") || document["promise"].value("kept", true);
+}
+
 std::optional<double> certified_error(std::string_view report) {
   const json document = parsed(report);
   if (!document.contains("certificate") || !document["certificate"].is_object()) return std::nullopt;

@@ -19,6 +19,12 @@ std::vector<std::string> report_warnings(std::string_view report_json);
 /// "error 1.2 % (95 % interval 1.0 .. 1.5 %), ..." of a report's certificate; empty when it has none.
 std::string certificate_text(std::string_view report_json);
 
+/// What became of a promised error or time, and where the error comes from; empty when nothing was promised.
+std::string promise_text(std::string_view report_json);
+
+/// False only where a promise was made and could not be kept.
+bool promise_kept(std::string_view report_json);
+
 /// relRMSE of a report's certificate; nothing when it has none.
 std::optional<double> certified_error(std::string_view report_json);
 

@@ -13,6 +13,7 @@
 #include "core/bake/job_light.h"
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
+#include "core/bake/progressive.h"
 #include "core/bake/report.h"
 #include "core/bake/transport.h"
 #include "core/base/sha256.h"
@@ -75,11 +76,104 @@ std::string log_text(const Plan& plan, const BakeLog& log, const Scene& scene) {
 
 Bytes to_bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
+Effort effort_of(const Recipe& recipe) {
+  return recipe.promise ? first_effort(recipe.promise) : effort_of(recipe.quality);
+}
+
 /// The delivered file, read back, with the input's pixels so that textures show in the preview.
 Result<BakedScene> reopen(const Bytes& file, const Scene& scene) {
   KILN_TRY(decoded, read_baked_glb(file));
   decoded.scene.images = scene.images;
   return decoded;
+}
+
+/// One whole bake of the scene as planned: an artefact and what is known of its error.
+struct Pass {
+  Plan plan;
+  Bytes glb;
+  std::vector<StreamBytes> streams;
+  BakedScene decoded;
+  std::optional<Certificate> certificate;
+  std::optional<ErrorSources> sources;
+};
+
+/// Leaves the refined surface in `scene`.
+Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional<Environment>& light, Plan plan,
+                       BakeLog& log, Threads& threads) {
+  Pass pass;
+  Transport transport = solve_transport(scene, plan, input.recipe.seed, log, threads);
+  log.begin("write", 0.9);
+  BakedScene baked = assemble(std::move(scene), std::move(transport.transfer), light, provenance(input));
+  const Encoding encoding{.coefficient_bits = plan.coefficient_bits};
+  KILN_TRY(glb, write_baked_glb(baked, encoding));
+  KILN_TRY(streams, stream_bytes(baked, encoding, glb));
+  scene = std::move(baked.scene);
+  baked = {};  // from here on the delivered file is what counts
+  KILN_TRY(decoded, reopen(glb, scene));
+  threads.check();
+  if (input.recipe.certificate) {
+    log.begin("certificate", 1.0);
+    const Tracer truth(scene, threads);
+    pass.certificate =
+        certify(decoded, truth, light,
+                {.bake_rays = log.rays(), .thorough = bool{input.recipe.promise}, .seed = input.recipe.seed}, threads);
+    pass.sources = split_error(*pass.certificate, decoded, transport.noise, plan);
+  }
+  pass.plan = std::move(plan);
+  pass.glb = std::move(glb);
+  pass.streams = std::move(streams);
+  pass.decoded = std::move(decoded);
+  return pass;
+}
+
+PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays) {
+  const ErrorStats& error = pass.certificate->transport;
+  PassRecord out{.order = pass.plan.order,
+                 .samples = pass.plan.samples,
+                 .bounces = pass.plan.bounces,
+                 .triangles = pass.decoded.scene.mesh.triangles.size(),
+                 .vertices = pass.decoded.scene.mesh.position.size(),
+                 .rays = rays,
+                 .seconds = seconds,
+                 .certificate_seconds = pass.certificate->seconds,
+                 .relrmse = error.relrmse,
+                 .low = error.interval_low,
+                 .high = error.interval_high,
+                 .own_relrmse = {},
+                 .own_high = {},
+                 .sources = *pass.sources};
+  if (pass.certificate->job_light) {
+    out.own_relrmse = pass.certificate->job_light->relrmse;
+    out.own_high = pass.certificate->job_light->interval_high;
+  }
+  return out;
+}
+
+/// A single pass where a quality was asked for; where a promise was made, passes until it is kept or cannot be.
+Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optional<Environment>& light, Plan plan,
+                         Passes& passes, BakeLog& log, Threads& threads) {
+  constexpr double kFirst = 0.06, kLast = 0.97, kShare = 0.6;  // of what is left of the progress, for each pass
+  if (!input.recipe.promise) {
+    log.share(0, kLast);
+    return bake_pass(input, scene, light, std::move(plan), log, threads);
+  }
+  const Mesh surface = scene.mesh;
+  std::optional<Pass> best;
+  std::optional<Plan> next = std::move(plan);
+  for (double done = kFirst; next; done += kShare * (kLast - done)) {
+    scene.mesh = surface;
+    const double start = log.seconds();
+    const std::uint64_t rays = log.rays();
+    log.share(done, done + kShare * (kLast - done));
+    KILN_TRY(pass, bake_pass(input, scene, light, *next, log, threads));
+    passes.add(record_of(pass, log.seconds() - start, log.rays() - rays));
+    log.know_error(passes.all()[passes.best()].relrmse);
+    const Plan last = pass.plan;
+    if (passes.best() + 1 == passes.all().size()) best = std::move(pass);
+    scene.mesh = surface;
+    next = passes.next(last, scene, log.seconds(), threads.count());
+  }
+  return std::move(*best);
 }
 
 }  // namespace
@@ -93,59 +187,47 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   threads.check();
 
   log.begin("plan", 0.06);
-  Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads);
+  const Plan plan = make_plan(scene, input.recipe.steps.front(), effort_of(input.recipe), threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
-
   if (!light && !plan.lamps) {
     scene.warnings.push_back(
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
-  Transfer transfer = solve_transport(scene, plan, input.recipe.seed, log, threads);
+  Passes passes(input.recipe.promise, input.recipe.steps.front(), input.recipe.limits);
+  KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, log, threads));
 
-  log.begin("write", 0.9);
-  BakedScene baked = assemble(std::move(scene), std::move(transfer), light, provenance(input));
-  const Encoding encoding{.coefficient_bits = plan.coefficient_bits};
-  KILN_TRY(glb, write_baked_glb(baked, encoding));
-  KILN_TRY(streams, stream_bytes(baked, encoding, glb));
-  baked.transfer = {};  // from here on the delivered file is what counts
-  KILN_TRY(decoded, reopen(glb, baked.scene));
-  threads.check();
-
-  std::optional<Certificate> certificate;
-  if (input.recipe.certificate) {
-    log.begin("certificate", 0.97);
-    const Tracer truth(baked.scene, threads);
-    certificate = certify(decoded, truth, light, {.bake_rays = log.rays(), .seed = input.recipe.seed}, threads);
-  }
-
+  log.share(0.97, 1);
   log.begin("preview", 1.0);
-  const Tracer picture(decoded.scene, threads);
-  KILN_TRY(preview, render_preview(decoded, picture, {}, threads));
+  const Tracer picture(pass.decoded.scene, threads);
+  KILN_TRY(preview, render_preview(pass.decoded, picture, {}, threads));
   log.end();
 
-  const std::string report = report_json({.input = baked.scene,
+  const std::string report = report_json({.input = pass.decoded.scene,
                                           .input_vertices = input_vertices,
                                           .input_triangles = input_triangles,
-                                          .plan = plan,
+                                          .plan = pass.plan,
                                           .recipe = input.recipe,
                                           .log = log,
-                                          .result = decoded.scene.mesh,
-                                          .result_bytes = glb.size(),
-                                          .streams = streams,
-                                          .certificate = certificate});
+                                          .result = pass.decoded.scene.mesh,
+                                          .result_bytes = pass.glb.size(),
+                                          .streams = pass.streams,
+                                          .certificate = pass.certificate,
+                                          .sources = pass.sources,
+                                          .passes = passes});
   BakeOutput output;
-  output.files.push_back({"scene.glb", "model/gltf-binary", std::move(glb)});
+  output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});
   output.files.push_back({"preview.png", "image/png", std::move(preview)});
   output.files.push_back({"report.json", "application/json", to_bytes(report)});
-  output.files.push_back({"log.txt", "text/plain; charset=utf-8", to_bytes(log_text(plan, log, baked.scene))});
+  output.files.push_back(
+      {"log.txt", "text/plain; charset=utf-8", to_bytes(log_text(pass.plan, log, pass.decoded.scene))});
   return output;
 }
 
 Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   KILN_TRY(scene, read_scene(input));
   if (auto light = job_light(input); !light) return tl::make_unexpected(light.error());
-  const Plan plan = make_plan(scene, input.recipe.steps.front(), input.recipe.quality, threads);
+  const Plan plan = make_plan(scene, input.recipe.steps.front(), effort_of(input.recipe), threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   return plan_report_json(plan, scene);
 }

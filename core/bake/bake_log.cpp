@@ -10,14 +10,14 @@ void BakeLog::begin(const std::string& stage, double fraction) {
   stage_start_ = Clock::now();
   running_ = true;
   done_before_ = done_after_;
-  done_after_ = fraction;
+  done_after_ = low_ + (high_ - low_) * fraction;
   advance(0, 1);
 }
 
 void BakeLog::advance(std::uint64_t done, std::uint64_t total) {
   if (!progress_ || stages_.empty()) return;
   const double part = total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total);
-  progress_({stages_.back().name, done, total, done_before_ + (done_after_ - done_before_) * part});
+  progress_({stages_.back().name, done, total, done_before_ + (done_after_ - done_before_) * part, error_});
 }
 
 void BakeLog::count_rays(std::uint64_t rays) {

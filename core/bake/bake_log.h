@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,10 @@ class BakeLog {
  public:
   explicit BakeLog(Progress progress) : progress_(std::move(progress)), start_(Clock::now()), stage_start_(start_) {}
 
+  /// The stages that follow share this part of the whole: their fractions count from its begin to its end.
+  void share(double begin, double end) { low_ = begin, high_ = end; }
+  /// What the bake knows of its error; told with the progress from now on.
+  void know_error(double relrmse) { error_ = relrmse; }
   /// Ends the stage before, if any, and starts one that brings the whole job to `fraction` when it ends.
   void begin(const std::string& stage, double fraction);
   /// Progress within the stage.
@@ -38,7 +43,9 @@ class BakeLog {
   Clock::time_point start_, stage_start_;
   std::vector<StageRecord> stages_;
   bool running_ = false;
+  double low_ = 0, high_ = 1;  // the share of the stages under way
   double done_before_ = 0, done_after_ = 0;
+  std::optional<double> error_;
 };
 
 /// The largest resident size this process has had, in bytes.

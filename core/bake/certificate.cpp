@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/artifact/evaluate.h"
+#include "core/bake/lightings.h"
 #include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
@@ -40,49 +41,6 @@ Probe probe_surface(const Mesh& delivered, const Mesh& input, std::size_t points
     probe.truth.push_back({to_float(match_position(input, *match)), normal, normalized(face, normal)});
   }
   return probe;
-}
-
-/// A lobe max(0, w.axis)^4 about one axis, projected: positive light that no two axes share much of.
-Environment lobe(const Vec3f& axis) {
-  Environment map;
-  map.width = 64;
-  map.height = 32;
-  map.radiance.clear();
-  for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x) {
-      const double azimuth = ((x + 0.5) / map.width - 0.5) * 2 * M_PI,
-                   elevation = (0.5 - (y + 0.5) / map.height) * M_PI;
-      const Vec3d w{std::cos(elevation) * std::cos(azimuth), std::sin(elevation),
-                    std::cos(elevation) * std::sin(azimuth)};
-      const auto value = static_cast<float>(std::pow(std::max(0.0, dot(w, to_double(axis))), 4));
-      map.radiance.push_back({value, value, value});
-    }
-  }
-  return map;
-}
-
-struct Lightings {
-  std::vector<std::string> names;
-  std::vector<std::vector<Vec3f>> sh;
-};
-
-Lightings test_lightings(const BakedScene& baked) {
-  Lightings out;
-  const int order = baked.transfer.order;
-  out.names = {"constant", "+x", "-x", "+y", "-y", "+z", "-z"};
-  out.sh.push_back(project_environment(constant_sky({1, 1, 1}), order));
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const float sign : {1.0F, -1.0F}) {
-      Vec3f direction;
-      direction[static_cast<std::size_t>(axis)] = sign;
-      out.sh.push_back(project_environment(lobe(direction), order));
-    }
-  }
-  if (!baked.light.coefficients.empty()) {
-    out.names.push_back(baked.light.name);
-    out.sh.push_back(baked.light.coefficients);
-  }
-  return out;
 }
 
 /// What the artefact shows under each lighting, the lamps last and alone: the fixed slot under darkness.
@@ -155,13 +113,14 @@ Samples judged_lightings(const Samples& all, const Lightings& lightings, double 
     const bool distant = k < lightings.sh.size();
     const std::string name = distant ? lightings.names[k] : "lamps";
     const double least = distant ? kDark * open_value(lightings.sh[k]) : kDarkLamps * lamps;
-    const double seen = std::max(mean_size(std::span(all.truth).subspan(k * points, points)),
-                                 mean_size(std::span(all.shown).subspan(k * points, points)));
+    const double truth = mean_size(std::span(all.truth).subspan(k * points, points));
+    const double seen = std::max(truth, mean_size(std::span(all.shown).subspan(k * points, points)));
     if (seen <= least) {
       certificate.dark.push_back(name);
       continue;
     }
     certificate.lightings.push_back(name);
+    certificate.mean_light.push_back(truth);
     judged.append(all, k * points, points);
   }
   return judged;
@@ -272,12 +231,12 @@ struct Spending {
 };
 
 /// A function of the scene and the bake's rays, never of time, so that reports repeat.
-Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint64_t bake_rays) {
+Spending plan_spending(const ErrorStats& pilot, double rays_per_path, const CertificateOptions& options) {
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
-  constexpr double kFewestPaths = 192 * kFewestPoints, kMostPaths = 4096 * kFewestPoints;  // the fewest: .1 s
+  constexpr double kTenthSecond = 192 * kFewestPoints, kSecond = 8 * kTenthSecond, kMostPaths = 4096 * kFewestPoints;
   constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
-  const double paths =
-      std::clamp(kShare * static_cast<double>(bake_rays) / (kSingleRay * rays_per_path), kFewestPaths, kMostPaths);
+  const double paths = std::clamp(kShare * static_cast<double>(options.bake_rays) / (kSingleRay * rays_per_path),
+                                  options.thorough ? kSecond : kTenthSecond, kMostPaths);
   const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance
   const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
   Spending out;
@@ -305,8 +264,7 @@ Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::o
   const ErrorStats known =
       compute_error({judged.shown, judged.truth, judged.noise, pilot.points}, {.seed = options.seed, .resamples = 1});
   const double paths = static_cast<double>(std::max<std::size_t>(pilot.points, 1)) * kPilotSamples;
-  const Spending spending =
-      plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options.bake_rays);
+  const Spending spending = plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options);
 
   Certificate out;
   const Probe many = probe(spending.points);

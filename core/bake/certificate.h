@@ -29,13 +29,15 @@
 namespace kiln {
 
 struct CertificateOptions {
-  std::uint64_t bake_rays = 0;  // what the bake sent: the certificate costs about 5 % of it, or a second
+  std::uint64_t bake_rays = 0;  // what the bake sent: the certificate costs about 5 % of it, or more:
+  bool thorough = false;        // about a second where a promise hangs on it, else a tenth of one
   std::uint64_t seed = 0;       // mixed so that it never repeats the bake's own samples
 };
 
 struct Certificate {
   ErrorStats transport;
   std::vector<std::string> lightings;   // names, in the order of transport.by_lighting
+  std::vector<double> mean_light;       // mean |reference| of each
   std::vector<std::string> dark;        // lightings that hardly reach the surface: not judged
   std::optional<ErrorStats> seen;       // transport at the points that can be seen, when some cannot
   std::optional<ErrorStats> job_light;  // when the job has any

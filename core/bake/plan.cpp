@@ -12,21 +12,6 @@
 namespace kiln {
 namespace {
 
-/// What the three words mean. The tail is the light left out beyond the last bounce, relative to all of it.
-struct Grade {
-  const char* name;
-  int order, samples, bounce_samples, lamp_samples;
-  double tail;
-  std::uint64_t triangles;
-  float threshold;  // of the residual measure; see subdivide.h
-  int bits;
-};
-constexpr std::array<Grade, 3> kGrades = {{
-    {"draft", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10},
-    {"standard", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12},
-    {"final", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14},
-}};
-
 /// Measured on the machine of core/prt/README.md, one thread: million rays a second, and bytes a vertex.
 constexpr double kRaysPerSecond = 8e6;
 constexpr std::uint64_t kBytesPerTriangle = 160;  // mesh, hierarchy and hash tables
@@ -51,34 +36,32 @@ void decide(Plan& plan, std::string decision, std::string value, std::string rea
 
 constexpr const char* kAsked = "asked for by the recipe";
 
-void plan_order(Plan& plan, const PrtStep& step, const Grade& grade) {
-  plan.order = step.order.value_or(grade.order);
+void plan_order(Plan& plan, const PrtStep& step, const Effort& effort) {
+  plan.order = step.order.value_or(effort.order);
   decide(plan, "order", std::to_string(plan.order),
-         step.order ? kAsked
-                    : std::string("the ") + grade.name + " quality keeps " + std::to_string(plan.order) +
-                          " bands of distant light");
+         step.order ? kAsked : effort.reason + " keeps " + std::to_string(plan.order) + " bands of distant light");
 }
 
-void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Grade& grade, Threads& threads) {
+void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Effort& effort, Threads& threads) {
   if (step.bounces) {
     plan.bounces = *step.bounces;
     return decide(plan, "bounces", std::to_string(plan.bounces), kAsked);
   }
-  const BounceTail tail = measure_bounces(Tracer(scene, threads), plan.lamps, grade.tail, threads);
+  const BounceTail tail = measure_bounces(Tracer(scene, threads), plan.lamps, effort.tail, threads);
   plan.bounces = tail.bounces;
+  plan.tail_left = tail.left;
   decide(plan, "bounces", std::to_string(plan.bounces),
          plan.bounces == 0 && tail.left == 0
              ? "no path finds light by reflection"
              : "sample paths bring " + text(100 * tail.left) + " % of the light in later reflections");
 }
 
-void plan_samples(Plan& plan, const PrtStep& step, const Grade& grade) {
-  plan.samples = step.samples.value_or(grade.samples);
-  plan.bounce_samples = step.samples ? std::max(16, *step.samples / 4) : grade.bounce_samples;
-  plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : grade.lamp_samples;
-  plan.coefficient_bits = step.coefficient_bits.value_or(grade.bits);
-  decide(plan, "samples", std::to_string(plan.samples),
-         step.samples ? kAsked : std::string("the ") + grade.name + " quality");
+void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {
+  plan.samples = step.samples.value_or(effort.samples);
+  plan.bounce_samples = step.samples ? std::max(16, *step.samples / 4) : effort.bounce_samples;
+  plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : effort.lamp_samples;
+  plan.coefficient_bits = step.coefficient_bits.value_or(effort.bits);
+  decide(plan, "samples", std::to_string(plan.samples), step.samples ? kAsked : effort.reason);
 }
 
 void plan_lamps(Plan& plan, const Scene& scene) {
@@ -88,24 +71,49 @@ void plan_lamps(Plan& plan, const Scene& scene) {
                     : "the scene has neither emitters nor punctual lights");
 }
 
-void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision& asked, const Grade& grade) {
+void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision& asked, const Effort& effort) {
   using Mode = PrtStep::Subdivision::Mode;
   const std::uint64_t input = scene.mesh.triangles.size();
-  const std::uint64_t budget = asked.triangles.value_or(input + grade.triangles);
+  const std::uint64_t budget = asked.triangles.value_or(input + effort.triangles);
   plan.split = asked.mode != Mode::off && budget > input;
   plan.subdivide = {.measure = asked.measure,
                     .alpha = asked.alpha,
-                    .threshold = asked.threshold.value_or(grade.threshold),
+                    .threshold = asked.threshold.value_or(effort.threshold),
                     .triangles = budget,
                     .max_depth = asked.max_depth};
   std::string reason = "the recipe's budget is above the input's " + std::to_string(input) + " triangles";
   if (!asked.triangles) {
-    reason = std::string("the ") + grade.name + " quality adds " + std::to_string(grade.triangles) +
-             " triangles where light changes";
+    reason = effort.reason + " adds " + std::to_string(effort.triangles) + " triangles where light changes";
   }
   if (budget <= input) reason = "the input's " + std::to_string(input) + " triangles use up the budget";
   if (asked.mode == Mode::off) reason = "turned off by the recipe";
   decide(plan, "subdivide", plan.split ? "up to " + std::to_string(budget) + " triangles" : "no", reason);
+}
+
+}  // namespace
+
+Effort effort_of(Quality quality) {
+  switch (quality) {
+    case Quality::draft:
+      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10};
+    case Quality::standard:
+      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14};
+}
+
+// The noise of stratified rays falls nearly as one over their number: about .1 at 16 on the bunny, .015 at 256.
+Effort first_effort(const Promise& promise) {
+  const double target = promise.target_error.value_or(0.05);
+  const int samples = std::clamp(16 * static_cast<int>(std::lround(0.1 / target)), 16, 256);
+  Effort effort{"the first pass", target >= 0.05 ? 4 : 6, samples, std::max(16, samples / 4),
+                std::max(16, samples / 4)};
+  effort.tail = std::clamp(target / 10, 5e-4, 0.02);
+  effort.triangles = static_cast<std::uint64_t>(std::clamp(100 / target, 500.0, 10'000.0));
+  effort.bits = target >= 0.05 ? 10 : target >= 0.01 ? 12 : 14;
+  return effort;
 }
 
 Prediction predict(const Plan& plan, const Scene& scene, int threads) {
@@ -126,16 +134,13 @@ Prediction predict(const Plan& plan, const Scene& scene, int threads) {
   return out;
 }
 
-}  // namespace
-
-Plan make_plan(const Scene& scene, const PrtStep& step, Quality quality, Threads& threads) {
-  const Grade& grade = kGrades[static_cast<std::size_t>(quality)];
+Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Threads& threads) {
   Plan plan;
-  plan_order(plan, step, grade);
+  plan_order(plan, step, effort);
   plan_lamps(plan, scene);
-  plan_bounces(plan, scene, step, grade, threads);
-  plan_samples(plan, step, grade);
-  plan_subdivision(plan, scene, step.subdivide, grade);
+  plan_bounces(plan, scene, step, effort, threads);
+  plan_samples(plan, step, effort);
+  plan_subdivision(plan, scene, step.subdivide, effort);
   decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
   plan.prediction = predict(plan, scene, threads.count());
   return plan;

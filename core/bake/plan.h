@@ -31,6 +31,7 @@ struct Prediction {
 struct Plan {
   int order = 6;
   int bounces = 0;
+  double tail_left = 0;      // share of the light in later reflections; 0 where the recipe says how many
   int samples = 1024;        // rays per point for distant light
   int bounce_samples = 256;  // rays per vertex and bounce
   int lamp_samples = 64;     // shadow rays per point over all emitters
@@ -42,7 +43,24 @@ struct Plan {
   Prediction prediction;
 };
 
+/// What a bake spends where the recipe does not say.
+struct Effort {
+  std::string reason;  // "the standard quality"
+  int order = 6, samples = 1024, bounce_samples = 256, lamp_samples = 256;
+  double tail = 0.002;          // of the light that may be left out beyond the last bounce
+  std::uint64_t triangles = 0;  // added where light changes
+  float threshold = 0;          // of the residual measure; see subdivide.h
+  int bits = 12;
+};
+
+Effort effort_of(Quality);
+/// Of the first, coarse pass towards a promise (progressive.h).
+Effort first_effort(const Promise&);
+
 /// Traces a few thousand paths to see how many reflections matter, unless the step says.
-Plan make_plan(const Scene&, const PrtStep&, Quality, Threads&);
+Plan make_plan(const Scene&, const PrtStep&, const Effort&, Threads&);
+
+/// Time, memory and bytes of a plan.
+Prediction predict(const Plan&, const Scene&, int threads);
 
 }  // namespace kiln

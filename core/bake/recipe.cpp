@@ -133,6 +133,45 @@ std::vector<PrtStep> read_steps(const json& value, Errors& errors) {
   return steps;
 }
 
+Promise read_promise(const json& value, Errors& errors) {
+  Promise promise;
+  JsonFields fields(value, "/quality", errors);
+  promise.target_error = fields.number("target_error", 1e-4, 1);
+  promise.time_budget_s = fields.number("time_budget_s", 0.01, 30.0 * 86400);
+  fields.finish();
+  if (value.empty())
+    errors.push_back({"/quality", "promises nothing", shown(value), "target_error, time_budget_s, or both"});
+  return promise;
+}
+
+void read_quality(JsonFields& fields, Recipe& recipe, Errors& errors) {
+  constexpr Quality kQualities[] = {Quality::draft, Quality::standard, Quality::finest};
+  const json* value = fields.find("quality");
+  if (value && value->is_object()) {
+    recipe.promise = read_promise(*value, errors);
+  } else if (const auto quality = fields.word("quality", {"draft", "standard", "final"})) {
+    recipe.quality = kQualities[*quality];
+  }
+}
+
+/// A promise is about the certificate, and needs something to spend on.
+void check_promise(const Recipe& recipe, Errors& errors) {
+  if (!recipe.promise) return;
+  if (!recipe.certificate)
+    errors.push_back({"/certificate", "must not be off: what /quality promises is what it proves", "false", "true"});
+  for (const PrtStep& step : recipe.steps) {
+    const bool split_fixed = step.subdivide.mode == PrtStep::Subdivision::Mode::off || step.subdivide.triangles;
+    if (step.samples && split_fixed) {
+      errors.push_back({"/quality", "leaves nothing to spend: samples and triangles of the step are given", "",
+                        "a promise, or both knobs"});
+    }
+  }
+  if (recipe.promise.time_budget_s && *recipe.promise.time_budget_s > recipe.limits.wall_s) {
+    errors.push_back({"/quality/time_budget_s", "is more than /limits/wall_s allows",
+                      shown(json(*recipe.promise.time_budget_s)), "at most " + shown(json(recipe.limits.wall_s))});
+  }
+}
+
 Limits read_limits(const json& value, Errors& errors) {
   Limits limits;
   JsonFields fields(value, "/limits", errors);
@@ -164,9 +203,7 @@ Recipe read_recipe(const json& document, Errors& errors) {
     recipe.steps = read_steps(*value, errors);
   else
     recipe.steps = {PrtStep{}};
-  constexpr Quality kQualities[] = {Quality::draft, Quality::standard, Quality::finest};
-  if (const auto quality = fields.word("quality", {"draft", "standard", "final"}))
-    recipe.quality = kQualities[*quality];
+  read_quality(fields, recipe, errors);
   recipe.seed = static_cast<std::uint64_t>(fields.integer("seed", 0, kMaxExactInteger).value_or(0));
   if (const json* value = fields.find("limits")) recipe.limits = read_limits(*value, errors);
   recipe.strict = fields.boolean("strict").value_or(false);
@@ -174,6 +211,7 @@ Recipe read_recipe(const json& document, Errors& errors) {
   recipe.label = fields.text("label", 200).value_or("");
   if (!is_utf8_text(recipe.label)) fields.error("label", "must be UTF-8 text without NUL", "text");
   fields.finish();
+  check_promise(recipe, errors);
   return recipe;
 }
 
@@ -191,6 +229,15 @@ json environment_json(const EnvironmentChoice& choice) {
 template <class T>
 json or_auto(const std::optional<T>& value) {
   return value ? json(*value) : json("auto");
+}
+
+json quality_json(const Recipe& recipe) {
+  constexpr const char* kQualities[] = {"draft", "standard", "final"};
+  if (!recipe.promise) return kQualities[static_cast<int>(recipe.quality)];
+  json out = json::object();
+  if (recipe.promise.target_error) out["target_error"] = *recipe.promise.target_error;
+  if (recipe.promise.time_budget_s) out["time_budget_s"] = *recipe.promise.time_budget_s;
+  return out;
 }
 
 json subdivision_json(const PrtStep::Subdivision& s) {
@@ -234,9 +281,8 @@ std::string recipe_identity(const Recipe& recipe) {
 }
 
 std::string recipe_json(const Recipe& recipe) {
-  constexpr const char* kQualities[] = {"draft", "standard", "final"};
   json out = {
-      {"quality", kQualities[static_cast<int>(recipe.quality)]},
+      {"quality", quality_json(recipe)},
       {"seed", recipe.seed},
       {"limits",
        {{"memory_mb", recipe.limits.memory_mb}, {"threads", recipe.limits.threads}, {"wall_s", recipe.limits.wall_s}}},

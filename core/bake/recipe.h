@@ -46,6 +46,14 @@ struct PrtStep {
 
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"
 
+/// What a bake must reach instead of a quality: the error its certificate proves, the time it may take, or whichever of
+/// both comes first.
+struct Promise {
+  std::optional<double> target_error;   // relRMSE: the upper end of the certificate's interval
+  std::optional<double> time_budget_s;  // of the whole bake
+  explicit operator bool() const { return target_error || time_budget_s; }
+};
+
 struct Limits {
   std::uint64_t memory_mb = 4096;
   int threads = 0;
@@ -56,7 +64,8 @@ struct Recipe {
   std::string scene_asset;  // sha256; empty when the scene is given otherwise
   EnvironmentChoice environment;
   std::vector<PrtStep> steps;
-  Quality quality = Quality::standard;
+  Quality quality = Quality::standard;  // where nothing is promised
+  Promise promise;
   std::uint64_t seed = 0;
   Limits limits;
   bool strict = false;

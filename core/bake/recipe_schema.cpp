@@ -62,7 +62,17 @@ std::string recipe_schema() {
         }
       }
     },
-    "quality": {"enum": ["draft", "standard", "final"], "default": "standard"},
+    "quality": {
+      "default": "standard",
+      "anyOf": [{"enum": ["draft", "standard", "final"]}, {
+        "type": "object", "additionalProperties": false, "minProperties": 1,
+        "description": "What the bake must reach; of both, whichever comes first.",
+        "properties": {
+          "target_error": {"description": "relRMSE that the upper end of the certificate's interval must not exceed", "type": "number", "minimum": 1e-4, "maximum": 1},
+          "time_budget_s": {"description": "seconds of the whole bake, kept within 20 %", "type": "number", "minimum": 0.01, "maximum": 2592000}
+        }
+      }]
+    },
     "seed": {"type": "integer", "minimum": 0, "maximum": 9007199254740991, "default": 0},
     "limits": {
       "type": "object", "additionalProperties": false,

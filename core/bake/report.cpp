@@ -93,6 +93,44 @@ ordered_json parameters_object(const Plan& plan) {
           {"coefficient_bits", plan.coefficient_bits}};
 }
 
+ordered_json sources_object(const ErrorSources& s) {
+  ordered_json out = {{"noise", s.noise},
+                      {"interpolation", s.interpolation},
+                      {"bounce_tail", s.bounce_tail},
+                      {"quantisation", s.quantisation}};
+  if (s.truncation) out["truncation"] = *s.truncation;
+  return out;
+}
+
+ordered_json pass_list(const Passes& passes) {
+  ordered_json list = ordered_json::array();
+  for (const PassRecord& p : passes.all()) {
+    list.push_back({{"order", p.order},
+                    {"samples", p.samples},
+                    {"bounces", p.bounces},
+                    {"triangles", p.triangles},
+                    {"vertices", p.vertices},
+                    {"rays", p.rays},
+                    {"seconds", p.seconds},
+                    {"relrmse", p.relrmse},
+                    {"interval", {p.low, p.high}},
+                    {"sources", sources_object(p.sources)}});
+  }
+  return list;
+}
+
+ordered_json promise_object(const Promise& promise, const Passes& passes) {
+  constexpr const char* kEndings[] = {"target_met", "time_spent", "floor"};
+  ordered_json out;
+  if (promise.target_error) out["target_error"] = *promise.target_error;
+  if (promise.time_budget_s) out["time_budget_s"] = *promise.time_budget_s;
+  out["kept"] = passes.kept();
+  out["ended_by"] = kEndings[static_cast<int>(passes.outlook().ending)];
+  out["reason"] = passes.outlook().reason;
+  out["passes"] = pass_list(passes);
+  return out;
+}
+
 std::string text_of(const ordered_json& json) {
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
@@ -100,18 +138,21 @@ std::string text_of(const ordered_json& json) {
 }  // namespace
 
 std::string report_json(const ReportInput& in) {
-  return text_of({{"engine", std::string("kiln ") + kEngineVersion},
-                  {"scene", scene_object(in)},
-                  {"plan", plan_list(in.plan)},
-                  {"parameters", parameters_object(in.plan)},
-                  {"recipe", ordered_json::parse(recipe_json(in.recipe))},
-                  {"stages", stage_list(in.log)},
-                  {"seconds", in.log.seconds()},
-                  {"rays", in.log.rays()},
-                  {"peak_memory_bytes", peak_memory_bytes()},
-                  {"result", result_object(in)},
-                  {"warnings", warning_list(in.input)},
-                  {"certificate", certificate_object(in.certificate)}});
+  ordered_json out = {{"engine", std::string("kiln ") + kEngineVersion},
+                      {"scene", scene_object(in)},
+                      {"plan", plan_list(in.plan)},
+                      {"parameters", parameters_object(in.plan)},
+                      {"recipe", ordered_json::parse(recipe_json(in.recipe))},
+                      {"stages", stage_list(in.log)},
+                      {"seconds", in.log.seconds()},
+                      {"rays", in.log.rays()},
+                      {"peak_memory_bytes", peak_memory_bytes()},
+                      {"result", result_object(in)},
+                      {"warnings", warning_list(in.input)},
+                      {"certificate", certificate_object(in.certificate)}};
+  if (in.sources) out["error_sources"] = sources_object(*in.sources);
+  if (in.recipe.promise) out["promise"] = promise_object(in.recipe.promise, in.passes);
+  return text_of(out);
 }
 
 std::string plan_report_json(const Plan& plan, const Scene& scene) {

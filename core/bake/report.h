@@ -8,7 +8,7 @@
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
 #include "core/bake/plan.h"
-#include "core/prt/direct_transfer.h"
+#include "core/bake/progressive.h"
 
 namespace kiln {
 
@@ -23,6 +23,8 @@ struct ReportInput {
   std::uint64_t result_bytes = 0;
   const std::vector<StreamBytes>& streams;
   const std::optional<Certificate>& certificate;
+  const std::optional<ErrorSources>& sources;
+  const Passes& passes;  // none where a quality was asked for
 };
 
 std::string report_json(const ReportInput&);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include "core/bake/surface_samples.h"
+#include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/interreflection.h"
@@ -129,6 +131,47 @@ Subdivided bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source,
   return subdivide(base, source.source(), plan.subdivide, threads);
 }
 
+constexpr std::size_t kProbes = 256;
+
+/// Vertices in proportion to the area around them.
+std::vector<std::uint32_t> choose_probes(const Mesh& mesh) {
+  std::vector<std::uint32_t> out;
+  for (const SurfaceSample& s : sample_surface(mesh, kProbes, 0x70726f6265ULL)) {
+    const Triangle& t = mesh.triangles[s.triangle];
+    out.push_back(s.u + s.v < 0.5F ? t[0] : s.u > s.v ? t[1] : t[2]);
+  }
+  return out;
+}
+
+std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  const std::vector<std::uint32_t> face = widest_faces(mesh);
+  std::vector<TransferPoint> out;
+  for (const std::uint32_t v : vertices) out.push_back(vertex_point(mesh, v, face[v]));
+  return out;
+}
+
+/// Direct light in two independent draws: the second minus the first, shaped as NoiseProbes.
+std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPoint>& points, const Plan& plan,
+                              std::uint64_t seed, Threads& threads) {
+  const auto bands = static_cast<std::size_t>(sh_count(plan.order)), slots = bands + (plan.lamps ? 1 : 0);
+  std::vector<float> out(points.size() * 3 * slots, 0.0F);
+  for (const float sign : {-1.0F, 1.0F}) {
+    const std::uint64_t draw = sign < 0 ? seed : mix64(seed ^ 0x6e6f697365ULL);
+    const std::vector<float> sky =
+        bake_direct_transfer(tracer, points, {.order = plan.order, .samples = plan.samples, .seed = draw}, threads);
+    std::vector<Vec3f> lamps(points.size());
+    if (plan.lamps) lamps = bake_fixed_direct(tracer, points, {.samples = plan.lamp_samples, .seed = draw}, threads);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        float* to = out.data() + (3 * p + c) * slots;
+        for (std::size_t i = 0; i < bands; ++i) to[i] += sign * sky[p * bands + i];
+        if (plan.lamps) to[bands] += sign * lamps[p][c];
+      }
+    }
+  }
+  return out;
+}
+
 void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
   if (plan.bounces == 0 || source.stats.open_points < source.points) return;
   plan.bounces = 0;
@@ -140,11 +183,13 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 
 }  // namespace
 
-Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads) {
+Transport solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads) {
   std::vector<float> sky;
   std::vector<Vec3f> lamps;
-  log.begin("transfer", 0.55);
   std::vector<StandIn> stand_ins;
+  Transport out;
+  std::vector<float> direct_noise;
+  log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
     DirectSource source(tracer, plan, seed, log, threads);
@@ -153,6 +198,8 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
     stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats.rays);
     skip_bounces_of_open_scene(plan, source);
+    out.noise.vertices = choose_probes(direct.mesh);
+    direct_noise = draw_twice(tracer, points_at(direct.mesh, out.noise.vertices), plan, seed, threads);
     return std::move(direct.mesh);
   }();
   scene.mesh = std::move(refined);
@@ -160,17 +207,21 @@ Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& 
   log.begin("bounces", 0.85);
   const Tracer tracer(scene, threads);
   TransferStats stats;
-  Transfer transfer =
+  ProbeNoise reflected;
+  out.transfer =
       bake_interreflection(tracer, scene.mesh, std::move(sky), std::move(lamps),
                            {.order = plan.order,
                             .bounces = plan.bounces,
                             .samples = plan.bounce_samples,
                             .seed = seed,
                             .stand_ins = std::move(stand_ins),
+                            .probes = out.noise.vertices,
                             .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
-                           threads, &stats);
+                           threads, &stats, &reflected);
   log.count_rays(stats.rays);
-  return transfer;
+  out.noise.difference = std::move(direct_noise);
+  for (std::size_t i = 0; i < reflected.difference.size(); ++i) out.noise.difference[i] += reflected.difference[i];
+  return out;
 }
 
 }  // namespace kiln

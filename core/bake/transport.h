@@ -2,6 +2,7 @@
 // The `prt` step: direct transfer while the mesh is refined, then reflections between its surfaces.
 
 #include <cstdint>
+#include <vector>
 
 #include "core/bake/bake_log.h"
 #include "core/bake/plan.h"
@@ -11,8 +12,19 @@
 
 namespace kiln {
 
+/// What two independent draws of the same samples tell at some vertices, spread evenly over the surface.
+struct NoiseProbes {
+  std::vector<std::uint32_t> vertices;
+  std::vector<float> difference;  // [probe * 3 * slots + c * slots + i]: second draw minus first, always RGB
+};
+
+struct Transport {
+  Transfer transfer;  // of scene.mesh's vertices
+  NoiseProbes noise;
+};
+
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.
-Transfer solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads);
+Transport solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads);
 
 }  // namespace kiln

@@ -56,14 +56,14 @@ class Solver {
     pitch_ = pitch_of(out_);
   }
 
-  Transfer solve(Threads& threads, TransferStats* stats) {
+  Transfer solve(Threads& threads, TransferStats* stats, ProbeNoise* noise) {
     if (params_.bounces > 0) plan_work();
     out_.coefficients.resize(mesh_.position.size() * (pitch_ / sizeof(float)));
     Layer light = layer(0);  // T_0 = D
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
       store(light, v, direct_row(v), fixed_at(v), params_.bounces > 0);
     }
-    if (params_.bounces > 0) iterate(light, threads, stats);
+    if (params_.bounces > 0) iterate(light, threads, stats, noise);
     unpack(light);
     return std::move(out_);
   }
@@ -112,7 +112,7 @@ class Solver {
   }
 
   // T_{k+1} = D + K T_k, `bounces` times.
-  void iterate(Layer& light, Threads& threads, TransferStats* stats) {
+  void iterate(Layer& light, Threads& threads, TransferStats* stats, ProbeNoise* noise) {
     const DirectionSets many(0, params_.samples, kSets, mix64(params_.seed));
     const DirectionSets few(0, early_samples(params_), kSets, mix64(params_.seed));
     Layer next = layer(1);
@@ -128,10 +128,33 @@ class Solver {
         rays += gatherer.rays();
       });
       if (stats != nullptr) stats->rays += rays;
+      if (noise != nullptr && pass + 1 == params_.bounces) noise->difference = draw_probes_twice(source);
       std::swap(light, next);
       sent += static_cast<std::uint64_t>(sets.samples());
       if (params_.progress) params_.progress(sent, rays_per_vertex(params_));
     }
+  }
+
+  std::vector<float> draw_probes_twice(const GatherSource& first) const {
+    GatherSource second = first;
+    second.seed = mix64(first.seed ^ 0x6e6f697365ULL);
+    Gatherer a(first), b(second);
+    const std::size_t slots = count() + (out_.fixed ? 1 : 0);
+    std::vector<float> difference(params_.probes.size() * 3 * slots, 0.0F);
+    float* to = difference.data();
+    for (const std::uint32_t v : params_.probes) {
+      if (sees_surfaces_[v]) {
+        a.gather(point_of(v));
+        b.gather(point_of(v));
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t from = (out_.channels == 1 ? 0 : c) * count();
+          for (std::size_t i = 0; i < count(); ++i) to[c * slots + i] = b.result()[from + i] - a.result()[from + i];
+          if (out_.fixed) to[c * slots + count()] = b.fixed()[c] - a.fixed()[c];
+        }
+      }
+      to += 3 * slots;
+    }
+    return difference;
   }
 
   void update(std::uint32_t v, Gatherer& gatherer, int pass, Layer& next) const {
@@ -192,14 +215,14 @@ std::uint64_t rays_per_vertex(const Interreflection& params) {
 
 Transfer bake_interreflection(const Tracer& tracer, const Mesh& mesh, std::vector<float> direct,
                               std::vector<Vec3f> fixed_direct, const Interreflection& params, Threads& threads,
-                              TransferStats* stats) {
+                              TransferStats* stats, ProbeNoise* noise) {
   EXPECTS(params.order >= 1 && params.order <= kMaxShOrder);
   EXPECTS(params.bounces >= 0 && params.samples >= 1 && params.samples <= 65536);
   EXPECTS(mesh.position.size() == tracer.scene().mesh.position.size());
   EXPECTS(direct.size() == mesh.position.size() * static_cast<std::size_t>(sh_count(params.order)));
   EXPECTS(fixed_direct.empty() || fixed_direct.size() == mesh.position.size());
   Solver solver(tracer, std::move(direct), std::move(fixed_direct), params);
-  return solver.solve(threads, stats);
+  return solver.solve(threads, stats, noise);
 }
 
 }  // namespace kiln

@@ -24,8 +24,15 @@ struct Interreflection {
   int bounces = 1;    // passes, >= 0
   int samples = 256;  // closest-hit rays per vertex in each of the last two passes; a quarter of them before
   std::uint64_t seed = 0;
-  std::vector<StandIn> stand_ins = {};  // where hidden vertices gather instead; ascending
+  std::vector<StandIn> stand_ins = {};     // where hidden vertices gather instead; ascending
+  std::vector<std::uint32_t> probes = {};  // vertices whose last pass is done twice, to see its noise
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // rays of a vertex, told after each pass
+};
+
+/// Reflected light at probes in two independent draws of the last pass: the second minus the first.
+/// Shape   difference[probe * 3 * slots + c * slots + i], always RGB; nothing when bounces = 0
+struct ProbeNoise {
+  std::vector<float> difference;
 };
 
 /// Rays that all passes send from one vertex.
@@ -36,7 +43,7 @@ std::uint64_t rays_per_vertex(const Interreflection&);
 /// refinement of it: `mesh` names the vertices, and must have the tracer's surface.
 Transfer bake_interreflection(const Tracer&, const Mesh& mesh, std::vector<float> direct,
                               std::vector<Vec3f> fixed_direct, const Interreflection&, Threads&,
-                              TransferStats* stats = nullptr);
+                              TransferStats* stats = nullptr, ProbeNoise* noise = nullptr);
 
 /// Direct light of emitters and punctual lights at points: irradiance / pi, RGB.
 struct FixedDirect {

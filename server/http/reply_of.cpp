@@ -3,7 +3,7 @@
 namespace kiln {
 
 ProgressReply progress_reply(const JobProgress& progress) {
-  return {progress.stage, progress.done, progress.total, progress.fraction, progress.eta_s, std::nullopt};
+  return {progress.stage, progress.done, progress.total, progress.fraction, progress.eta_s, progress.error};
 }
 
 ArtifactReply artifact_reply(const Artifact& artifact) {

@@ -44,6 +44,7 @@ struct JobProgress {
   std::uint64_t done = 0, total = 0;  // in units of the stage
   double fraction = 0;                // of the whole job, [0, 1], never falling within one attempt
   std::optional<double> eta_s;        // absent while unknown
+  std::optional<double> error = {};   // relRMSE of the last pass, where a bake has passes; told, not kept in the store
 };
 
 /// Why a job failed: the fault and the status that an HTTP answer would carry (422 for the input's own faults).

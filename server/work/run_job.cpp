@@ -54,7 +54,7 @@ class Pulse {
   void progress(const ProgressEvent& event) {
     const auto now = Clock::now();
     const bool new_stage = event.stage != newest_.stage;
-    newest_ = {event.stage, event.done, event.total, std::max(newest_.fraction, event.fraction), {}};
+    newest_ = {event.stage, event.done, event.total, std::max(newest_.fraction, event.fraction), {}, event.error};
     const double elapsed = std::chrono::duration<double>(now - started_).count();
     if (newest_.fraction > 0.01) newest_.eta_s = elapsed * (1 - newest_.fraction) / newest_.fraction;
     if (!new_stage && now - shown_ < kShowProgressEvery) return;

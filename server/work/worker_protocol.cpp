@@ -32,12 +32,15 @@ ProgressEvent read_progress(const json& value) {
   ProgressEvent event{short_text(value.at("stage")), value.at("done").get<std::uint64_t>(),
                       value.at("total").get<std::uint64_t>(), value.at("fraction").get<double>()};
   event.fraction = std::isfinite(event.fraction) ? std::clamp(event.fraction, 0.0, 1.0) : 0.0;
+  if (value.contains("error")) event.error = std::max(0.0, value["error"].get<double>());
   return event;
 }
 
 struct LineWriter {
   json operator()(const ProgressEvent& e) const {
-    return {{"progress", {{"stage", e.stage}, {"done", e.done}, {"total", e.total}, {"fraction", e.fraction}}}};
+    json progress = {{"stage", e.stage}, {"done", e.done}, {"total", e.total}, {"fraction", e.fraction}};
+    if (e.error) progress["error"] = *e.error;
+    return {{"progress", std::move(progress)}};
   }
   json operator()(const WorkerArtifact& a) const {
     return {{"artifact", {{"name", a.name}, {"media_type", a.media_type}}}};

@@ -1,6 +1,6 @@
 #pragma once
 // What supervisor and worker tell each other: job.json down, JSON lines on descriptor 3 up, an exit code at the end.
-//   {"progress":{"stage","done","total","fraction"}}   {"artifact":{"name","media_type"}}
+//   {"progress":{"stage","done","total","fraction"[,"error"]}}   {"artifact":{"name","media_type"}}
 //   {"fault":{"code","message","where"}}               {"done":true}
 
 #include <filesystem>

@@ -51,6 +51,15 @@ TEST(Recipe, NumbersOutsideTheirTypeAreRefusedNotRounded) {
             std::vector<std::string>{"/environment/intensity"});
 }
 
+TEST(Recipe, APromiseThatContradictsOtherKnobsIsRefused) {
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"certificate":false})"),
+            std::vector<std::string>{"/certificate"});
+  EXPECT_EQ(pointers(R"({"quality":{"time_budget_s":100},"limits":{"wall_s":50}})"),
+            std::vector<std::string>{"/quality/time_budget_s"});
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"prt","samples":64,"subdivide":"off"}]})"),
+            std::vector<std::string>{"/quality"});
+}
+
 TEST(Recipe, TwoLightsAtOnceAreRefused) {
   EXPECT_EQ(pointers(R"({"environment":{"builtin":"clear","constant":[1,1,1]}})"),
             std::vector<std::string>{"/environment"});

@@ -1,0 +1,110 @@
+#include "core/bake/error_sources.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "core/bake/lightings.h"
+
+namespace kiln {
+namespace {
+
+constexpr double kInterpolated = 0.5;  // mean of (1-u-v)^2 + u^2 + v^2 over a triangle: three independent vertices
+
+double square(double x) { return x * x; }
+double root(double squared) { return std::sqrt(std::max(0.0, squared)); }
+
+/// Squared values of rows of RGB coefficients under each judged lighting.
+class Judged {
+ public:
+  Judged(const Certificate& certificate, const BakedScene& decoded)
+      : transfer_(decoded.transfer), all_(test_lightings(decoded)), certificate_(certificate) {}
+
+  /// Mean over the judged lightings of squared(light) / mean_light^2; light[i] of a channel, the lamps' slot last.
+  template <class Squared>
+  double mean(const Squared& squared) const {
+    double sum = 0;
+    std::size_t lit = 0;
+    for (std::size_t k = 0; k < certificate_.lightings.size(); ++k) {
+      if (!(certificate_.mean_light[k] > 0)) continue;
+      double rgb = 0;
+      for (std::size_t c = 0; c < 3; ++c) rgb += squared(weights(certificate_.lightings[k], c), c) / 3;
+      sum += rgb / square(certificate_.mean_light[k]);
+      ++lit;
+    }
+    return lit > 0 ? sum / static_cast<double>(lit) : 0;
+  }
+
+ private:
+  std::vector<double> weights(const std::string& name, std::size_t channel) const {
+    std::vector<double> out(static_cast<std::size_t>(transfer_.slots()), 0.0);
+    const auto found = std::ranges::find(all_.names, name);
+    if (found == all_.names.end()) {
+      out.back() = 1;  // the lamps
+      return out;
+    }
+    const auto& sh = all_.sh[static_cast<std::size_t>(found - all_.names.begin())];
+    for (std::size_t i = 0; i < sh.size(); ++i) out[i] = sh[i][channel];
+    return out;
+  }
+
+  const Transfer& transfer_;
+  Lightings all_;
+  const Certificate& certificate_;
+};
+
+/// The variance of one draw is half that of the difference of two.
+double noise_squared(const Judged& judged, const NoiseProbes& noise, std::size_t slots) {
+  if (noise.vertices.empty()) return 0;
+  return kInterpolated * judged.mean([&](const std::vector<double>& weight, std::size_t c) {
+    double sum = 0;
+    for (std::size_t p = 0; p < noise.vertices.size(); ++p) {
+      const float* d = noise.difference.data() + (3 * p + c) * slots;
+      double value = 0;
+      for (std::size_t i = 0; i < slots; ++i) value += weight[i] * d[i];
+      sum += square(value) / 2;
+    }
+    return sum / static_cast<double>(noise.vertices.size());
+  });
+}
+
+double quantisation_squared(const Judged& judged, const Transfer& transfer, int bits) {
+  const auto slots = static_cast<std::size_t>(transfer.slots());
+  std::vector<double> variance(static_cast<std::size_t>(transfer.channels) * slots, 0.0);
+  for (std::size_t s = 0; s < variance.size(); ++s) {
+    float low = 0, high = 0;
+    for (std::size_t v = 0; v < transfer.vertices(); ++v) {
+      const float x = transfer.coefficients[v * transfer.stride() + s];
+      low = v == 0 ? x : std::min(low, x);
+      high = v == 0 ? x : std::max(high, x);
+    }
+    variance[s] = square(std::ldexp(double{high} - low, -bits)) / 12;
+  }
+  return kInterpolated * judged.mean([&](const std::vector<double>& weight, std::size_t c) {
+    double sum = 0;
+    for (std::size_t i = 0; i < slots; ++i)
+      sum += square(weight[i]) * variance[(transfer.channels == 1 ? 0 : c) * slots + i];
+    return sum;
+  });
+}
+
+}  // namespace
+
+ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const NoiseProbes& noise,
+                         const Plan& plan) {
+  const Judged judged(certificate, decoded);
+  const double rays = noise_squared(judged, noise, static_cast<std::size_t>(decoded.transfer.slots()));
+  const double steps = quantisation_squared(judged, decoded.transfer, plan.coefficient_bits);
+  ErrorSources out{.noise = root(rays), .bounce_tail = plan.tail_left, .quantisation = root(steps)};
+  out.interpolation = root(square(certificate.transport.relrmse) - rays - steps - square(plan.tail_left));
+  if (certificate.job_light && !certificate.transport.by_lighting.empty()) {
+    const auto own = std::ranges::find(certificate.lightings, decoded.light.name);
+    const bool known = own != certificate.lightings.end() && !decoded.light.coefficients.empty();
+    const double held =
+        known ? certificate.transport.by_lighting[static_cast<std::size_t>(own - certificate.lightings.begin())] : 0;
+    if (known) out.truncation = root(square(certificate.job_light->relrmse) - square(held));
+  }
+  return out;
+}
+
+}  // namespace kiln

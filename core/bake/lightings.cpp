@@ -1,0 +1,50 @@
+#include "core/bake/lightings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/scene/environment.h"
+
+namespace kiln {
+namespace {
+
+Environment lobe(const Vec3f& axis) {
+  Environment map;
+  map.width = 64;
+  map.height = 32;
+  map.radiance.clear();
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double azimuth = ((x + 0.5) / map.width - 0.5) * 2 * M_PI,
+                   elevation = (0.5 - (y + 0.5) / map.height) * M_PI;
+      const Vec3d w{std::cos(elevation) * std::cos(azimuth), std::sin(elevation),
+                    std::cos(elevation) * std::sin(azimuth)};
+      const auto value = static_cast<float>(std::pow(std::max(0.0, dot(w, to_double(axis))), 4));
+      map.radiance.push_back({value, value, value});
+    }
+  }
+  return map;
+}
+
+}  // namespace
+
+Lightings test_lightings(const BakedScene& baked) {
+  Lightings out;
+  const int order = baked.transfer.order;
+  out.names = {"constant", "+x", "-x", "+y", "-y", "+z", "-z"};
+  out.sh.push_back(project_environment(constant_sky({1, 1, 1}), order));
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float sign : {1.0F, -1.0F}) {
+      Vec3f direction;
+      direction[static_cast<std::size_t>(axis)] = sign;
+      out.sh.push_back(project_environment(lobe(direction), order));
+    }
+  }
+  if (!baked.light.coefficients.empty()) {
+    out.names.push_back(baked.light.name);
+    out.sh.push_back(baked.light.coefficients);
+  }
+  return out;
+}
+
+}  // namespace kiln

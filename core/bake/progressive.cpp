@@ -1,0 +1,195 @@
+#include "core/bake/progressive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace kiln {
+namespace {
+
+using Ending = Outlook::Ending;
+
+constexpr std::size_t kMostPasses = 10;
+constexpr double kMostSamples = 8, kMostTriangles = 6;  // growth of one pass,
+constexpr double kMostCost = 8;                         // and of their product: a wrong guess costs no more than that
+constexpr double kLeastGrowth = 1.3;                    // below it another pass is not worth its cost
+constexpr double kMaxRays = 65536;
+
+double square(double x) { return x * x; }
+
+std::string percent(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %%", 100 * x);
+  return text;
+}
+
+}  // namespace
+
+Passes::Passes(const Promise& promise, const PrtStep& step, const Limits& limits)
+    : promise_(promise), step_(step), limits_(limits) {}
+
+void Passes::add(PassRecord pass) {
+  all_.push_back(std::move(pass));
+  if (all_.back().high <= all_[best_].high || all_.back().order > all_[best_].order) best_ = all_.size() - 1;
+}
+
+std::optional<Plan> Passes::end(Ending ending, std::string reason) {
+  outlook_ = {ending, std::move(reason)};
+  return std::nullopt;
+}
+
+bool Passes::transport_met() const { return promise_.target_error && all_.back().high <= *promise_.target_error; }
+
+bool Passes::own_light_bound() const {
+  return promise_.target_error && !step_.order && all_.back().own_high.has_value();
+}
+
+/// The last pass cost at least twice the one before it and hardly helped.
+bool Passes::stuck() const {
+  if (all_.size() < 3) return false;
+  const PassRecord& now = all_.back();
+  const PassRecord& before = all_[all_.size() - 3];
+  return now.order == before.order && now.relrmse > 0.9 * before.relrmse && now.high > 0.9 * before.high &&
+         now.rays > 4 * before.rays;
+}
+
+double Passes::time_growth(double elapsed_s) const {
+  if (!promise_.time_budget_s) return HUGE_VAL;
+  const PassRecord& now = all_.back();
+  const double reserve = std::max(0.2, 0.04 * *promise_.time_budget_s);  // preview and report
+  const double left = *promise_.time_budget_s - reserve - elapsed_s - now.certificate_seconds;
+  return left / std::max(1e-3, now.seconds - now.certificate_seconds);
+}
+
+/// From two passes of one order that differ in triangles; three quarters until there are such.
+double Passes::interpolation_power() const {
+  constexpr double kUsual = 0.75;
+  if (all_.size() < 2) return kUsual;
+  const PassRecord& a = all_[all_.size() - 2];
+  const PassRecord& b = all_.back();
+  if (a.order != b.order || !(b.sources.interpolation > 0) || !(a.sources.interpolation > 0)) return kUsual;
+  const double growth = std::log(static_cast<double>(b.triangles) / static_cast<double>(a.triangles));
+  if (growth < 0.2) return kUsual;
+  return std::clamp(std::log(a.sources.interpolation / b.sources.interpolation) / growth, 0.25, 1.0);
+}
+
+bool Passes::free_triangles() const {
+  return step_.subdivide.mode != PrtStep::Subdivision::Mode::off && !step_.subdivide.triangles;
+}
+
+/// Growth that brings the error to `wanted`, as cheaply as the model knows.
+Passes::Growth Passes::towards(double wanted) const {
+  const bool free_samples = !step_.samples, free_triangles = this->free_triangles();
+  const ErrorSources& s = all_.back().sources;
+  const double noise = square(s.noise), space = square(s.interpolation), p = interpolation_power();
+  const double left = std::max(square(wanted) - square(s.bounce_tail) - square(s.quantisation), 0.1 * square(wanted));
+  double space_share = left / (1 + 2 * p), noise_share = left - space_share;
+  if (noise <= noise_share || !free_samples) space_share = std::max(left - noise, 0.1 * left);
+  if (space <= space_share || !free_triangles) noise_share = std::max(left - space, 0.1 * left);
+  Growth growth;
+  if (free_samples) growth.samples = std::clamp(noise / noise_share, 1.0, kMostSamples);
+  if (free_triangles) growth.triangles = std::clamp(std::pow(space / space_share, 1 / (2 * p)), 1.0, kMostTriangles);
+  return growth;
+}
+
+/// The lowest error that a growth of `cost` buys.
+Passes::Growth Passes::within(double cost) const {
+  double cheap = std::max(all_.back().relrmse, 1e-6), dear = cheap / 64;
+  for (int i = 0; i < 32; ++i) {
+    const double middle = std::sqrt(cheap * dear);
+    (towards(middle).cost() > cost ? dear : cheap) = middle;
+  }
+  return towards(cheap);
+}
+
+std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& scene, int threads) {
+  Plan plan = last;
+  const auto more = [&](int samples) {
+    return static_cast<int>(std::min(kMaxRays, std::ceil(samples * growth.samples / 16) * 16));
+  };
+  if (!step_.samples) {
+    plan.samples = more(last.samples);
+    plan.bounce_samples = more(last.bounce_samples);
+    plan.lamp_samples = more(last.lamp_samples);
+  }
+  if (growth.triangles > 1) {
+    const double triangles = growth.triangles * static_cast<double>(all_.back().triangles);
+    plan.subdivide.triangles = static_cast<std::uint64_t>(std::min(triangles, 5e7));
+    plan.split = plan.subdivide.triangles > scene.mesh.triangles.size();
+  }
+  plan.prediction = predict(plan, scene, threads);
+  if (plan.prediction.memory_bytes > limits_.memory_mb << 20) {
+    return end(Ending::floor,
+               "reached " + percent(all_[best_].high) + "; more triangles would need more than /limits/memory_mb");
+  }
+  for (Decision& d : plan.decisions) {
+    const std::string reason = "pass " + std::to_string(all_.size() + 1) + ", from the error of the last one";
+    if (d.decision == "samples") d = {"samples", std::to_string(plan.samples), reason};
+    if (d.decision == "subdivide" && plan.split)
+      d = {"subdivide", "up to " + std::to_string(plan.subdivide.triangles) + " triangles", reason};
+  }
+  return plan;
+}
+
+/// Truncation falls about as order^-1.5 under skies with a sun: an order is tried only if ten bands may do.
+std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, double elapsed_s, int threads) {
+  constexpr int kStep = 2;
+  const PassRecord& now = all_.back();
+  const double at_ten = *now.own_relrmse * std::pow(static_cast<double>(now.order) / kMaxShOrder, 1.5);
+  if (now.order >= kMaxShOrder || at_ten > *promise_.target_error) {
+    return end(Ending::floor, "transport reached " + percent(now.high) + " of " + percent(*promise_.target_error) +
+                                  ", but " + std::to_string(now.order) + " bands hold the job's own light only to " +
+                                  percent(*now.own_high) +
+                                  ": no order up to 10 suffices; a given /steps/0/order bounds transport alone");
+  }
+  if (time_growth(elapsed_s) < kLeastGrowth)
+    return end(Ending::time_spent, "the time ended before a higher order was baked");
+  Plan plan = last;
+  plan.order = std::min(kMaxShOrder, now.order + kStep);
+  plan.prediction = predict(plan, scene, threads);
+  for (Decision& d : plan.decisions) {
+    if (d.decision == "order")
+      d = {"order", std::to_string(plan.order), "fewer bands cannot hold the job's own light to the target"};
+  }
+  return plan;
+}
+
+std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double elapsed_s, int threads) {
+  const PassRecord& now = all_.back();
+  if (transport_met()) {
+    if (!own_light_bound() || *now.own_high <= *promise_.target_error)
+      return end(Ending::target_met, "reached " + percent(now.high) + " of " + percent(*promise_.target_error));
+    return higher_order(last, scene, elapsed_s, threads);
+  }
+  const double affordable = time_growth(elapsed_s);
+  if (affordable < kLeastGrowth) {
+    return end(Ending::time_spent, "the time is spent; reached " + percent(all_[best_].high));
+  }
+  const std::string floor =
+      "reached " + percent(all_[best_].high) + " of " + percent(promise_.target_error.value_or(0)) + ": ";
+  if (all_.size() >= kMostPasses) return end(Ending::floor, floor + "the last of ten passes has ended");
+  if (stuck())
+    return end(Ending::floor,
+               floor + "neither more rays nor more triangles lower it; a higher /steps/0/subdivide/max_depth may");
+
+  // The interval ends above the error: aim so that its end meets the target.
+  const double most = affordable > kMostCost ? (promise_.time_budget_s ? 4 : kMostCost) : 0.9 * affordable;
+  Growth growth = within(most);
+  if (promise_.target_error) {
+    const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
+    if (const Growth wanted = towards(aim); wanted.cost() < most) growth = wanted;
+  }
+  if (growth.cost() < 1.05) {
+    const bool free_samples = !step_.samples;
+    if (free_samples && free_triangles()) {
+      growth = {kLeastGrowth, kLeastGrowth};
+    } else {
+      return end(promise_.target_error ? Ending::floor : Ending::time_spent,
+                 "reached " + percent(all_[best_].high) + "; what is left comes from what the recipe fixes: " +
+                     (free_samples ? "/steps/0/subdivide" : "/steps/0/samples"));
+    }
+  }
+  return grown(last, growth, scene, threads);
+}
+
+}  // namespace kiln

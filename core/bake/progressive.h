@@ -1,0 +1,81 @@
+#pragma once
+// The progressive loop: a bake that promised an error or a time advances in passes, and each ends with a whole,
+// certified artefact. After a pass the next is planned from where the error of the last came from.
+//
+//   noise ~ 1 / sqrt(rays a vertex),  interpolation ~ triangles^-p,  cost ~ rays x triangles
+// so that of a wanted squared error the cheapest share for interpolation is 1 / (1 + 2 p): the rest is noise.
+// Passes begin afresh with more of both: with a growth of four the earlier ones cost a third of the last.
+// Repeat  a target alone gives the same passes and bytes on any machine; a time budget cannot.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/bake/certificate.h"
+#include "core/bake/error_sources.h"
+#include "core/bake/plan.h"
+#include "core/bake/recipe.h"
+
+namespace kiln {
+
+/// What one pass spent and reached.
+struct PassRecord {
+  int order = 0, samples = 0, bounces = 0;
+  std::uint64_t triangles = 0, vertices = 0;  // of the result
+  std::uint64_t rays = 0;
+  double seconds = 0, certificate_seconds = 0;  // all of it, and the part that does not grow with the work
+  double relrmse = 0, low = 0, high = 0;        // transport, with its interval
+  std::optional<double> own_relrmse, own_high;  // under the job's own light in full
+  ErrorSources sources;
+};
+
+/// What became of a promise.
+struct Outlook {
+  enum class Ending { target_met, time_spent, floor } ending = Ending::floor;
+  std::string reason;  // a sentence: what was reached, and of a floor which knob would lower it
+};
+
+/// The passes of one bake.
+class Passes {
+ public:
+  Passes(const Promise&, const PrtStep&, const Limits&);
+
+  void add(PassRecord);
+  const std::vector<PassRecord>& all() const { return all_; }
+  /// The pass whose interval ends lowest: what is delivered.
+  std::size_t best() const { return best_; }
+
+  /// The plan of the next pass; nothing when the promise is kept or cannot be, as outlook() then says.
+  /// `last` is the plan of the newest pass, `input_triangles` and the scene's size limit what can grow,
+  /// `elapsed_s` counts from the start of the bake.
+  std::optional<Plan> next(const Plan& last, const Scene&, double elapsed_s, int threads);
+  const Outlook& outlook() const { return outlook_; }
+  bool kept() const { return outlook_.ending != Outlook::Ending::floor; }
+
+ private:
+  struct Growth {
+    double samples = 1, triangles = 1;
+    double cost() const { return samples * triangles; }
+  };
+  std::optional<Plan> end(Outlook::Ending, std::string reason);
+  bool transport_met() const;
+  bool own_light_bound() const;  // the target bounds the job's own light too: no order was asked for
+  bool stuck() const;
+  bool free_triangles() const;  // the recipe leaves their number open
+  double time_growth(double elapsed_s) const;
+  double interpolation_power() const;
+  Growth towards(double wanted) const;
+  Growth within(double cost) const;
+  std::optional<Plan> higher_order(const Plan& last, const Scene&, double elapsed_s, int threads);
+  std::optional<Plan> grown(const Plan& last, Growth, const Scene&, int threads);
+
+  Promise promise_;
+  PrtStep step_;
+  Limits limits_;
+  std::vector<PassRecord> all_;
+  std::size_t best_ = 0;
+  Outlook outlook_;
+};
+
+}  // namespace kiln

@@ -1,0 +1,176 @@
+// A promised error is kept, and the next pass follows from where the error comes from.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/artifact/baked_scene.h"
+#include "core/bake/bake.h"
+#include "core/bake/certificate.h"
+#include "core/bake/demo_scene.h"
+#include "core/bake/job_light.h"
+#include "core/bake/progressive.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+BakeInput input_of(const std::string& scene, const std::string& recipe) {
+  BakeInput input;
+  input.scene.name = scene + ".glb";
+  input.scene.main = *demo_scene(scene);
+  input.recipe = *parse_recipe(recipe);
+  return input;
+}
+
+const Bytes& file(const BakeOutput& output, const std::string& name) {
+  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
+}
+
+json report_of(const BakeOutput& output) { return json::parse(file(output, "report.json")); }
+
+std::string recipe_for(const std::string& quality, const std::string& more = "") {
+  return R"({"environment":{"builtin":"clear"},"quality":)" + quality + R"(,"steps":[{"do":"prt","order":3)" + more +
+         "}]}";
+}
+
+/// relRMSE of a delivered file at points of its own, with another seed than the bake's.
+double independent_error(const BakeInput& input, const BakeOutput& output) {
+  Threads threads;
+  const auto scene = import_scene(input.scene, {});
+  const auto decoded = read_baked_glb(file(output, "scene.glb"));
+  const Tracer truth(*scene, threads);
+  return certify(*decoded, truth, *job_light(input), {.thorough = true, .seed = 99}, threads).transport.relrmse;
+}
+
+TEST(Promise, ATargetIsMetAndHoldsAtOtherPoints) {
+  Threads threads;
+  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.12})"));
+  const auto output = bake(input, {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  const json promise = report_of(*output)["promise"];
+  EXPECT_EQ(promise["ended_by"], "target_met") << promise;
+  EXPECT_LE(report_of(*output)["certificate"]["interval"][1].get<double>(), 0.12);
+  EXPECT_LE(independent_error(input, *output), 0.12);
+}
+
+TEST(Promise, ThePassesAndBytesOfATargetHangOnNoThread) {
+  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.2})"));
+  Threads one(1), two(2);
+  const auto a = bake(input, {}, one), b = bake(input, {}, two);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(report_of(*a)["promise"]["passes"].size(), report_of(*b)["promise"]["passes"].size());
+  EXPECT_EQ(file(*a, "scene.glb"), file(*b, "scene.glb"));
+}
+
+TEST(Promise, ABudgetTooShortForOnePassStillGivesAWholeArtefact) {
+  Threads threads;
+  const auto output = bake(input_of("column", recipe_for(R"({"time_budget_s":0.01})")), {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  EXPECT_TRUE(read_baked_glb(file(*output, "scene.glb")).has_value());
+  const json promise = report_of(*output)["promise"];
+  EXPECT_EQ(promise["ended_by"], "time_spent");
+  EXPECT_EQ(promise["passes"].size(), 1U);
+}
+
+TEST(Promise, WhatCannotBeMetIsToldWithTheKnobThatHinders) {
+  Threads threads;
+  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.001})", R"(,"subdivide":"off")"));
+  const auto output = bake(input, {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  const json promise = report_of(*output)["promise"];
+  EXPECT_EQ(promise["ended_by"], "floor");
+  EXPECT_FALSE(promise["kept"].get<bool>());
+  EXPECT_NE(promise["reason"].get<std::string>().find("/steps/0/subdivide"), std::string::npos) << promise["reason"];
+}
+
+TEST(Promise, ErrorSourcesAreSquaresThatSumToTheCertificate) {
+  Threads threads;
+  const auto output = bake(input_of("column", recipe_for(R"("draft")")), {}, threads);
+  ASSERT_TRUE(output);
+  const json report = report_of(*output), sources = report["error_sources"];
+  double sum = 0;
+  for (const char* name : {"noise", "interpolation", "bounce_tail", "quantisation"}) {
+    const auto part = sources[name].get<double>();
+    EXPECT_GE(part, 0) << name;
+    sum += part * part;
+  }
+  const auto whole = report["certificate"]["relrmse"].get<double>();
+  EXPECT_GE(std::sqrt(sum) * (1 + 1e-9), whole);
+  if (sources["interpolation"].get<double>() > 0) {
+    EXPECT_NEAR(std::sqrt(sum), whole, 1e-9);
+  }
+}
+
+/// The noise of rays is seen where nothing else is: the same vertices with four and sixteen times as many.
+TEST(Promise, NoiseIsEstimatedWithinAThirdOfWhatMoreRaysTakeAway) {
+  Threads threads;
+  const auto run = [&](int samples) {
+    const auto output =
+        bake(input_of("column",
+                      R"({"environment":{"builtin":"uniform"},"steps":[{"do":"prt","order":3,"bounces":0,"samples":)" +
+                          std::to_string(samples) + R"(,"subdivide":"off"}]})"),
+             {}, threads);
+    return report_of(*output);
+  };
+  const json few = run(16), many = run(4096);
+  const auto square = [](const json& x) { return x.get<double>() * x.get<double>(); };
+  const double taken = square(few["certificate"]["relrmse"]) - square(many["certificate"]["relrmse"]);
+  const double told = square(few["error_sources"]["noise"]);
+  EXPECT_NEAR(std::sqrt(told), std::sqrt(taken), std::sqrt(taken) / 3);
+}
+
+PassRecord pass_with(double noise, double interpolation) {
+  PassRecord pass;
+  pass.order = 6;
+  pass.samples = 64;
+  pass.triangles = 10'000;
+  pass.seconds = 1;
+  pass.sources = {.noise = noise, .interpolation = interpolation};
+  pass.relrmse = std::sqrt(noise * noise + interpolation * interpolation);
+  pass.low = 0.9 * pass.relrmse;
+  pass.high = 1.1 * pass.relrmse;
+  return pass;
+}
+
+Plan next_after(const PassRecord& pass) {
+  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  passes.add(pass);
+  Plan plan;
+  plan.samples = pass.samples;
+  plan.subdivide.triangles = pass.triangles;
+  return *passes.next(plan, Scene{}, 1, 1);
+}
+
+TEST(Promise, TheNextPassSpendsOnTheLargestSource) {
+  const Plan noisy = next_after(pass_with(0.05, 0.005));
+  EXPECT_GT(noisy.samples, 128);
+  EXPECT_EQ(noisy.subdivide.triangles, 10'000U);
+  const Plan coarse = next_after(pass_with(0.005, 0.05));
+  EXPECT_EQ(coarse.samples, 64);
+  EXPECT_GT(coarse.subdivide.triangles, 20'000U);
+}
+
+TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
+  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  passes.add(pass_with(0.01, 0.01));
+  EXPECT_FALSE(passes.next({}, Scene{}, 1, 1));
+  EXPECT_EQ(passes.outlook().ending, Outlook::Ending::target_met);
+  EXPECT_TRUE(passes.kept());
+}
+
+TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
+  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  for (int i = 0; i < 3; ++i) {
+    PassRecord pass = pass_with(0.03, 0.03);
+    pass.rays = 1'000'000ULL << (2 * i);
+    passes.add(pass);
+  }
+  EXPECT_FALSE(passes.next({}, Scene{}, 1, 1));
+  EXPECT_EQ(passes.outlook().ending, Outlook::Ending::floor);
+}
+
+}  // namespace
+}  // namespace kiln
