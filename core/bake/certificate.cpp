@@ -104,23 +104,34 @@ struct Samples {
   }
 };
 
+/// How much of each lighting reaches the surface, in truth or in the artefact; of the lamps last.
+std::vector<double> reach_of(const Samples& all, const Lightings& lightings, double lamps, std::size_t points) {
+  std::vector<double> reach;
+  for (std::size_t k = 0; k < lightings.sh.size() + (lamps > 0 ? 1 : 0); ++k) {
+    const double whole = k < lightings.sh.size() ? open_value(lightings.sh[k]) : lamps;
+    const double seen = std::max(mean_size(std::span(all.truth).subspan(k * points, points)),
+                                 mean_size(std::span(all.shown).subspan(k * points, points)));
+    reach.push_back(whole > 0 ? seen / whole : 0);
+  }
+  return reach;
+}
+
 /// The lightings that matter here; the others are named in certificate.dark.
 Samples judged_lightings(const Samples& all, const Lightings& lightings, double lamps, Certificate& certificate) {
   constexpr double kDark = 0.01, kDarkLamps = 1e-4;  // a lamp's texture may be black nearly everywhere
+  constexpr double kFaint = 0.05;                    // of the lighting that reaches most
   Samples judged;
-  const std::size_t points = certificate.points, count = lightings.sh.size() + (lamps > 0 ? 1 : 0);
-  for (std::size_t k = 0; k < count; ++k) {
-    const bool distant = k < lightings.sh.size();
-    const std::string name = distant ? lightings.names[k] : "lamps";
-    const double least = distant ? kDark * open_value(lightings.sh[k]) : kDarkLamps * lamps;
-    const double truth = mean_size(std::span(all.truth).subspan(k * points, points));
-    const double seen = std::max(truth, mean_size(std::span(all.shown).subspan(k * points, points)));
-    if (seen <= least) {
+  const std::size_t points = certificate.points, distant = lightings.sh.size();
+  const std::vector<double> reach = reach_of(all, lightings, lamps, points);
+  const double most = *std::max_element(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(distant));
+  for (std::size_t k = 0; k < reach.size(); ++k) {
+    const std::string name = k < distant ? lightings.names[k] : "lamps";
+    if (reach[k] <= (k < distant ? std::max(kDark, kFaint * most) : kDarkLamps)) {
       certificate.dark.push_back(name);
       continue;
     }
     certificate.lightings.push_back(name);
-    certificate.mean_light.push_back(truth);
+    certificate.mean_light.push_back(mean_size(std::span(all.truth).subspan(k * points, points)));
     judged.append(all, k * points, points);
   }
   return judged;

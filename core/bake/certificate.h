@@ -4,9 +4,9 @@
 // Points    area-uniform on the delivered surface; the reference stands at the nearest place of the input surface with
 //           a compatible normal.
 // Transport error: lightings of the artefact's own order (constant, six lobes, the job's light, the scene's lamps).
-//                  A lighting of which less than a hundredth (of lamps: a ten-thousandth) reaches the surface, in truth
-//                  and in the artefact, is listed as dark and not judged: relative to nothing, every rounding is an
-//                  error.
+//                  A lighting of which less than a hundredth reaches the surface, or a twentieth of what reaches it of
+//                  another (of lamps: a ten-thousandth), in truth and in the artefact, is listed as dark and not
+//                  judged: relative to nothing, every rounding is an error.
 // Job light The artefact as the job lights it against that light in full detail, lamps and all: what `kiln eval` and
 //           `kiln reference` show. It adds what the order cannot hold of a sharp sky.
 // Seen      Points inside solids count (the artefact has light to tell there, and truth is black), but nobody sees them

@@ -13,6 +13,7 @@ constexpr std::size_t kMostPasses = 10;
 constexpr double kMostSamples = 8, kMostTriangles = 6;  // growth of one pass,
 constexpr double kMostCost = 8;                         // and of their product: a wrong guess costs no more than that
 constexpr double kLeastGrowth = 1.3;                    // below it another pass is not worth its cost
+constexpr double kShareOfWall = 0.8;                    // of limits.wall_s, beyond which the job would be killed
 constexpr double kMaxRays = 65536;
 
 double square(double x) { return x * x; }
@@ -54,10 +55,10 @@ bool Passes::stuck() const {
 }
 
 double Passes::time_growth(double elapsed_s) const {
-  if (!promise_.time_budget_s) return HUGE_VAL;
   const PassRecord& now = all_.back();
-  const double reserve = std::max(0.2, 0.04 * *promise_.time_budget_s);  // preview and report
-  const double left = *promise_.time_budget_s - reserve - elapsed_s - now.certificate_seconds;
+  const double budget = promise_.time_budget_s.value_or(kShareOfWall * limits_.wall_s);
+  const double reserve = std::max(0.2, 0.04 * budget);  // preview and report
+  const double left = budget - reserve - elapsed_s - now.certificate_seconds;
   return left / std::max(1e-3, now.seconds - now.certificate_seconds);
 }
 
@@ -163,7 +164,9 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double el
   }
   const double affordable = time_growth(elapsed_s);
   if (affordable < kLeastGrowth) {
-    return end(Ending::time_spent, "the time is spent; reached " + percent(all_[best_].high));
+    return promise_.time_budget_s ? end(Ending::time_spent, "the time is spent; reached " + percent(all_[best_].high))
+                                  : end(Ending::floor, "reached " + percent(all_[best_].high) +
+                                                           "; another pass would need more than /limits/wall_s");
   }
   const std::string floor =
       "reached " + percent(all_[best_].high) + " of " + percent(promise_.target_error.value_or(0)) + ": ";

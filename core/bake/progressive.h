@@ -5,7 +5,8 @@
 //   noise ~ 1 / sqrt(rays a vertex),  interpolation ~ triangles^-p,  cost ~ rays x triangles
 // so that of a wanted squared error the cheapest share for interpolation is 1 / (1 + 2 p): the rest is noise.
 // Passes begin afresh with more of both: with a growth of four the earlier ones cost a third of the last.
-// Repeat  a target alone gives the same passes and bytes on any machine; a time budget cannot.
+// Repeat  a target alone gives the same passes and bytes on any machine that is not stopped by limits.wall_s; a time
+//         budget cannot.
 
 #include <cstdint>
 #include <optional>

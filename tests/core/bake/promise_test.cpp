@@ -161,6 +161,14 @@ TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
   EXPECT_TRUE(passes.kept());
 }
 
+TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
+  Passes passes({.target_error = 0.02}, {.order = 6}, {.wall_s = 10});
+  passes.add(pass_with(0.05, 0.05));
+  EXPECT_FALSE(passes.next({}, Scene{}, 8, 1));
+  EXPECT_FALSE(passes.kept());
+  EXPECT_NE(passes.outlook().reason.find("/limits/wall_s"), std::string::npos);
+}
+
 TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
   Passes passes({.target_error = 0.02}, {.order = 6}, {});
   for (int i = 0; i < 3; ++i) {
