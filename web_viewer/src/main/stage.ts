@@ -45,8 +45,11 @@ export class Stage {
   private readonly resizes: ResizeObserver;
   private frame = 0;
 
-  constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    context: WebGL2RenderingContext,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.info.autoReset = true;
     this.renderer.setClearColor(kPlainBackground);
     this.controls = new OrbitControls(this.camera, canvas);

@@ -1,6 +1,6 @@
 // The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
 
-import type { LoadedAsset } from '../asset/load_gltf';
+import type { LoadedAsset } from '../asset/parse_gltf';
 import type { Relighter } from '../light/relighter';
 import { unshadowedLevel } from '../light/unshadowed';
 import { SkyBackground } from '../shaders/sky_background';
@@ -65,8 +65,6 @@ export class Viewer {
   static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>, relighter: Relighter): Promise<Viewer> {
     const model = await BakedModel.create(asset);
     const viewer = new Viewer(stage, asset, model, state, relighter);
-    const { order, channels, fixed, slots, scale, offset } = model.transfer;
-    await relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
     await viewer.relightOnce();
     performance.mark('kiln:lit');
     await viewer.measureLevel();
@@ -241,6 +239,5 @@ export class Viewer {
     this.background.dispose();
     this.pictures.dispose();
     this.model.dispose();
-    this.asset.dispose();
   }
 }
