@@ -36,6 +36,18 @@ function checkShowable(job: Job): void {
     throw new Error(job.error ? explain(job.error) : `The job is ${job.status}; there is nothing to show.`);
 }
 
+/// `begun` resolves with the first that is heard of it.
+function openScene(url: string, relighter: Relighter, { overlay }: Page) {
+  let hear = () => {};
+  const heard = new Promise<void>((resolve) => (hear = resolve));
+  const opened = relighter.open(url, ({ loaded, total }) => {
+    hear();
+    const [text, fraction] = total ? [`${bytes(loaded)} of ${bytes(total)}`, loaded / total] : [bytes(loaded), null];
+    overlay.show(`Loading ${text}`, fraction);
+  });
+  return { opened, begun: Promise.race([heard, opened]) };
+}
+
 async function open(page: Page): Promise<void> {
   const relighter = new Relighter();
   page.onDispose(() => relighter.dispose());
@@ -46,13 +58,8 @@ async function open(page: Page): Promise<void> {
   document.title = `${asked.label || page.id} – Kiln`;
   const job = await whenFinished(asked, page);
   checkShowable(job);
-  const opened = relighter.open(artifactUrl(job, 'scene.glb'), ({ loaded, total }) =>
-    page.overlay.show(
-      total ? `Loading ${bytes(loaded)} of ${bytes(total)}` : `Loading ${bytes(loaded)}`,
-      total ? loaded / total : null,
-    ),
-  );
-  opened.catch(() => undefined); // is awaited by show()
+  const { opened, begun } = openScene(artifactUrl(job, 'scene.glb'), relighter, page);
+  await begun; // a worker cannot start while the next line blocks this thread
   const context = createContext(page.canvas);
   performance.mark('kiln:context');
   const { show } = await viewer;

@@ -68,6 +68,7 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
   viewer.onLegend = (shown) => legend.show(shown, kLegendTitles[state.get().mode] ?? '');
   viewer.onBefore = (stops) => divider.showStops(stops);
   viewer.onFailure = (message) => toast(message, 'error');
+  viewer.complete();
   const actions = { screenshot: () => void saveScreenshot(stage, id), help: () => help.showModal() };
   area.append(toolbar(viewer, job, actions));
   turnLightByDragging(stage, state);

@@ -65,12 +65,25 @@ export class Viewer {
   static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>, relighter: Relighter): Promise<Viewer> {
     const model = await BakedModel.create(asset);
     const viewer = new Viewer(stage, asset, model, state, relighter);
-    await viewer.relightOnce();
+    viewer.setLook();
+    const lit = Promise.all([viewer.relightOnce(), viewer.measureLevel()]);
+    model.setWhite(state.get().mode === 'light');
+    viewer.showSky();
+    stage.compile(); // while the worker computes
+    await lit;
     performance.mark('kiln:lit');
-    await viewer.measureLevel();
-    viewer.apply(new Set<keyof ViewState>(['ev', 'tone', 'background', 'wire', 'mode', 'compare']));
     stage.drawNow();
     return viewer;
+  }
+
+  /// What the first picture did without, and the functions above tell of.
+  complete(): void {
+    const { wire, mode, compare } = this.state.get();
+    const missing = new Set<keyof ViewState>();
+    if (wire) missing.add('wire');
+    if (isFalseColour(mode)) missing.add('mode');
+    if (compare !== null) missing.add('compare');
+    if (missing.size > 0) this.apply(missing);
   }
 
   private setPose(): void {
