@@ -5,13 +5,11 @@ import { defineConfig } from 'vite';
 const root = dirname(fileURLToPath(import.meta.url));
 const kilnd = process.env.KILN_SERVER ?? 'http://127.0.0.1:8080';
 
-// DRACOLoader names its default decoders by URL, so that they would be emitted although load_gltf.ts gives it others.
-const withoutUnusedDecoders = {
-  name: 'without-unused-decoders',
-  transform(code, id) {
-    if (!id.includes('DRACOLoader.js')) return null;
-    return { code: code.replace(/new URL\( '[^']*draco[^']*', import\.meta\.url \)\.toString\(\)/g, "''"), map: null };
-  },
+// Draco's decoder is a script that exports to whoever is there, but not to ES modules.
+const kDraco = 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
+const dracoAsModule = {
+  name: 'draco-as-module',
+  transform: (code, id) => (id.includes(kDraco) ? { code: `${code}\nexport default DracoDecoderModule;`, map: null } : null),
 };
 
 // The dev server answers as kilnd does: /view/{id} is view.html, /docs is docs.html.
@@ -29,8 +27,9 @@ const pagesOfKilnd = {
 export default defineConfig({
   root,
   base: '/',
-  plugins: [withoutUnusedDecoders, pagesOfKilnd],
-  worker: { format: 'es' },
+  plugins: [dracoAsModule, pagesOfKilnd],
+  worker: { format: 'es', plugins: () => [dracoAsModule] },
+  optimizeDeps: { exclude: [kDraco] },
   server: { proxy: { '/v1': kilnd, '/openapi.json': kilnd } },
   build: {
     target: 'es2022',

@@ -60,25 +60,31 @@ interface GltfJson {
   meshes?: { primitives: { extensions?: Record<string, unknown> }[] }[];
 }
 
+/// The root extension of a glTF; undefined: not one of ours. Throws on a version or shape it does not know.
+export function readExtension(json: unknown): RadianceTransferExtension | undefined {
+  const extension = (json as GltfJson).extensions?.[kName] as RadianceTransferExtension | undefined;
+  if (extension) checkShape(extension);
+  return extension;
+}
+
 /// Reads the extension and finds its primitives in the default scene. Throws on a version or shape it does not know.
 export function readRadianceTransfer(gltf: LoadedGltf): RadianceTransfer | undefined {
   const json = gltf.parser.json as GltfJson;
-  const extension = json.extensions?.[kName] as RadianceTransferExtension | undefined;
+  const extension = readExtension(json);
   if (!extension) return undefined;
-  checkShape(extension);
   const parts: TransferPart[] = [];
   gltf.scene.traverse((object) => {
     const mesh = object as Mesh;
-    if (!mesh.isMesh || !mesh.geometry.hasAttribute(extension.attributes[0].toLowerCase())) return;
     const place = gltf.parser.associations.get(mesh);
-    const own = json.meshes?.[place?.meshes ?? -1]?.primitives[place?.primitives ?? 0]?.extensions?.[kName] as
-      Partial<TransferPart> | undefined;
+    const primitive = json.meshes?.[place?.meshes ?? -1]?.primitives[place?.primitives ?? 0];
+    const own = primitive?.extensions?.[kName] as Partial<TransferPart> | undefined;
+    if (!mesh.isMesh || !own) return;
     parts.push({
       mesh,
       geometry: mesh.geometry,
-      albedo: own?.albedo ?? [1, 1, 1],
-      emission: own?.emission ?? [0, 0, 0],
-      material: own?.material ?? -1,
+      albedo: own.albedo ?? [1, 1, 1],
+      emission: own.emission ?? [0, 0, 0],
+      material: own.material ?? -1,
     });
   });
   return { ...extension, parts, bakedLight: Float32Array.from((extension.light?.coefficients ?? []).flat()) };

@@ -1,21 +1,12 @@
-// What the page and the light worker say to each other. Each request is answered by exactly one reply with its `serial`.
+// What the page and the light worker say to each other. Each request is answered by one reply with its `serial`; one of
+// `progress` is news and no answer yet.
 
 import type { EquirectMap } from './equirect';
-import type { TransferShape } from './transfer';
 
-/// One primitive as it was delivered.
-export interface PartData {
-  attributes: Float32Array[]; // _PRT_0.., 4 flat slots each
-  positions: Float32Array;
-  indices: Uint32Array;
-}
-
-export interface LoadRequest {
-  kind: 'load';
-  shape: TransferShape;
-  scale: number[];
-  offset: number[];
-  parts: PartData[];
+/// Fetches a scene.glb, keeps its transfer vectors and hands over the rest. `progress` replies come while it arrives.
+export interface OpenRequest {
+  kind: 'open';
+  url: string;
 }
 
 export interface RelightRequest {
@@ -51,7 +42,7 @@ export interface ProjectRequest {
 }
 
 export type Request =
-  LoadRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
+  OpenRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
 
 export interface ValuesReply {
   values: Float32Array[]; // one per part
@@ -64,4 +55,20 @@ export interface ProjectReply {
   map: EquirectMap;
 }
 
-export type Reply = { serial: number } & ({ values: ValuesReply } | { projected: ProjectReply } | { failure: string });
+export interface OpenReply {
+  file: ArrayBuffer; // a GLB without compression and without transfer vectors
+  bytes: number; // of scene.glb itself
+}
+
+export interface ProgressReply {
+  loaded: number; // bytes
+  total: number; // 0: unknown
+}
+
+export type Reply = { serial: number } & (
+  | { opened: OpenReply }
+  | { progress: ProgressReply }
+  | { values: ValuesReply }
+  | { projected: ProjectReply }
+  | { failure: string }
+);

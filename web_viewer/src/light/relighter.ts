@@ -1,8 +1,9 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
-import type { LoadRequest, ProjectReply, Reply, Request, ValuesReply } from './messages';
+import type { OpenReply, ProgressReply, ProjectReply, Reply, Request, ValuesReply } from './messages';
 
-type Answer = { resolve(reply: Reply): void; reject(error: Error): void };
+type Progress = (news: ProgressReply) => void;
+type Answer = { resolve(reply: Reply): void; reject(error: Error): void; progress?: Progress };
 
 export class Relighter {
   private readonly worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
@@ -16,10 +17,11 @@ export class Relighter {
     );
   }
 
-  /// Gives the transfer vectors away: the arrays of `request` are empty afterwards.
-  async load(request: Omit<LoadRequest, 'kind'>): Promise<void> {
-    const arrays = request.parts.flatMap((part) => part.attributes);
-    await this.ask({ kind: 'load', ...request }, arrays);
+  /// The worker fetches the scene.glb at `url`: everything below is about that file then.
+  async open(url: string, progress: Progress): Promise<OpenReply> {
+    const reply = await this.ask({ kind: 'open', url }, [], progress);
+    if (!('opened' in reply)) throw new Error('the light worker answered another question');
+    return reply.opened;
   }
 
   /// Light at every vertex of every part. `reuse`: arrays of an earlier reply that are no longer needed.
@@ -56,17 +58,18 @@ export class Relighter {
     return reply.values;
   }
 
-  private ask(request: Request, give: Float32Array[]): Promise<Reply> {
+  private ask(request: Request, give: Float32Array[], progress?: Progress): Promise<Reply> {
     const serial = ++this.serial;
     const transfer = [...new Set(give.map((array) => array.buffer))];
     return new Promise((resolve, reject) => {
-      this.waiting.set(serial, { resolve, reject });
+      this.waiting.set(serial, { resolve, reject, progress });
       this.worker.postMessage({ ...request, serial }, { transfer });
     });
   }
 
   private settle(reply: Reply): void {
     const answer = this.waiting.get(reply.serial);
+    if ('progress' in reply) return answer?.progress?.(reply.progress);
     this.waiting.delete(reply.serial);
     if ('failure' in reply) answer?.reject(new Error(reply.failure));
     else answer?.resolve(reply);

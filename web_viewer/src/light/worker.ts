@@ -1,7 +1,10 @@
-// The light worker: holds the transfer vectors of one asset and answers messages.ts.
+// The light worker: opens one asset, holds its transfer vectors and answers messages.ts.
 
+import { download } from '../asset/download';
+import { loadDraco } from '../asset/draco_module';
+import { unpack } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
-import type { LoadRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
+import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
 import { decodeAttributes, pickCoefficient, quantile, relight, triangleMeasure, type TransferShape } from './transfer';
 
 interface Part {
@@ -13,17 +16,23 @@ interface Part {
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
 
+const decoder = loadDraco(); // begun before there is anything to decode
+decoder.catch(() => undefined); // is awaited by open()
+
 let shape: TransferShape = { order: 0, channels: 1, fixed: false, slots: 0 };
 let parts: Part[] = [];
 
-function load(request: LoadRequest): Float32Array[] {
-  shape = request.shape;
-  parts = request.parts.map(({ attributes, positions, indices }) => ({
-    coefficients: decodeAttributes(shape, attributes, request.scale, request.offset),
+/// Answers as soon as the page can go on; the coefficients are decoded while it does.
+async function open({ url }: OpenRequest, serial: number): Promise<void> {
+  const packed = await download(url, (loaded, total) => send({ serial, progress: { loaded, total } }));
+  const { file, extension, baked } = unpack(await decoder, packed);
+  send({ serial, opened: { file, bytes: packed.byteLength } }, [file]);
+  shape = extension;
+  parts = baked.map(({ transfer, positions, indices }) => ({
+    coefficients: decodeAttributes(shape, transfer, extension.scale, extension.offset),
     positions,
     indices,
   }));
-  return [];
 }
 
 /// Lamps count: they are there whatever the sky.
@@ -67,10 +76,8 @@ function timed(compute: () => Float32Array[], ranged: boolean): ValuesReply {
   return { values, range: ranged ? rangeOf(values) : 0, milliseconds };
 }
 
-function compute(request: Exclude<Request, ProjectRequest>): ValuesReply {
+function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): ValuesReply {
   switch (request.kind) {
-    case 'load':
-      return timed(() => load(request), false);
     case 'relight':
       return timed(
         () => parts.map((p, i) => relight(shape, p.coefficients, request.light, request.lamps, request.reuse[i])),
@@ -85,21 +92,23 @@ function compute(request: Exclude<Request, ProjectRequest>): ValuesReply {
   }
 }
 
-function send(reply: Reply, buffers: Float32Array[]): void {
-  postMessage(reply, { transfer: buffers.map((array) => array.buffer) });
+function send(reply: Reply, give: ArrayBufferLike[] = []): void {
+  postMessage(reply, { transfer: give as ArrayBuffer[] });
 }
 
 addEventListener('message', async ({ data }: MessageEvent<Request & { serial: number }>) => {
   const { serial } = data;
   try {
-    if (data.kind === 'project') {
+    if (data.kind === 'open') {
+      await open(data, serial);
+    } else if (data.kind === 'project') {
       const projected = await project(data);
-      send({ serial, projected }, [projected.light, projected.map.data]);
+      send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);
     } else {
       const values = compute(data);
-      send({ serial, values }, values.values);
+      send({ serial, values }, values.values.map((array) => array.buffer));
     }
   } catch (error) {
-    send({ serial, failure: error instanceof Error ? error.message : String(error) }, []);
+    send({ serial, failure: error instanceof Error ? error.message : String(error) });
   }
 });

@@ -15,14 +15,8 @@ import {
   SRGBColorSpace,
   type Texture,
 } from 'three';
-import {
-  readRadianceTransfer,
-  transferAttributes,
-  type RadianceTransfer,
-  type TransferPart,
-} from '../asset/kiln_reader';
-import type { LoadedAsset } from '../asset/load_gltf';
-import type { PartData } from '../light/messages';
+import { readRadianceTransfer, type RadianceTransfer, type TransferPart } from '../asset/kiln_reader';
+import type { LoadedAsset } from '../asset/parse_gltf';
 import { bakedMaterial, type Glow } from '../shaders/baked_material';
 
 export interface BakedPart {
@@ -41,8 +35,6 @@ export class BakedModel {
   private constructor(
     asset: LoadedAsset,
     readonly transfer: RadianceTransfer,
-    /// What the light worker wants; it takes the arrays away.
-    readonly workerData: PartData[],
   ) {
     this.root = asset.gltf.scene;
     this.root.updateMatrixWorld(true);
@@ -52,8 +44,7 @@ export class BakedModel {
   static async create(asset: LoadedAsset): Promise<BakedModel> {
     const transfer = readRadianceTransfer(asset.gltf);
     if (!transfer || transfer.parts.length === 0) throw new Error('this glTF carries no KILN_radiance_transfer');
-    const data = transfer.parts.map((part) => takeTransfer(transfer, part));
-    const model = new BakedModel(asset, transfer, data);
+    const model = new BakedModel(asset, transfer);
     for (const part of transfer.parts) model.parts.push(await model.dress(part, asset));
     return model;
   }
@@ -113,20 +104,6 @@ export class BakedModel {
     }
     disposeAll(this.owned);
   }
-}
-
-/// Moves the coefficients out of the geometry: the GPU never sees them. Positions and indices are copied.
-function takeTransfer(transfer: RadianceTransfer, part: TransferPart): PartData {
-  const { geometry } = part;
-  const attributes = transferAttributes(transfer, geometry);
-  for (const name of transfer.attributes) geometry.deleteAttribute(name.toLowerCase());
-  geometry.deleteAttribute('color');
-  if (!geometry.index) throw new Error('a baked primitive has no indices');
-  return {
-    attributes,
-    positions: Float32Array.from(geometry.getAttribute('position').array),
-    indices: Uint32Array.from(geometry.index.array),
-  };
 }
 
 /// The emission texture of an original material, and nothing else of it: its other textures are not needed here.

@@ -1,4 +1,5 @@
 // The renderer, the camera and its controls. Draws only when asked to; between two requests nothing runs.
+// Nothing is drawn before the first drawNow(), so that no picture without light is made.
 
 import {
   ACESFilmicToneMapping,
@@ -16,6 +17,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { ShoulderToneMapping } from '../shaders/tone_map';
 import type { ToneMap } from './view_state';
+import { pixelRatio } from './webgl';
 
 const kToneMappings: Record<ToneMap, ToneMapping> = {
   baked: ShoulderToneMapping,
@@ -43,10 +45,13 @@ export class Stage {
   private readonly box = new Box3();
   private readonly bounds = new Sphere(new Vector3(), 1);
   private readonly resizes: ResizeObserver;
-  private frame = 0;
+  private frame = -1; // that of the animation; -1: nothing is to be drawn, not yet or no more
 
-  constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    context: WebGL2RenderingContext,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.info.autoReset = true;
     this.renderer.setClearColor(kPlainBackground);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -72,6 +77,11 @@ export class Stage {
     if (this.drawWith) this.drawWith(clientWidth, clientHeight);
     else this.renderer.render(this.scene, this.camera);
     this.onDrawn?.();
+  }
+
+  /// Sets the driver to what the next picture needs. Without it that picture waits for one shader after the other.
+  compile(): void {
+    this.renderer.compile(this.scene, this.camera);
   }
 
   setLook(exposure: number, toneMap: ToneMap): void {
@@ -143,11 +153,10 @@ export class Stage {
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.renderer.setDrawingBufferSize(clientWidth, clientHeight, pixelRatio());
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
-    this.drawNow(); // a resized canvas is blank: do not wait for the next frame
+    if (this.frame >= 0) this.drawNow(); // a resized canvas is blank: do not wait for the next frame
   }
 
   dispose(): void {

@@ -1,6 +1,6 @@
 // The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
 
-import type { LoadedAsset } from '../asset/load_gltf';
+import type { LoadedAsset } from '../asset/parse_gltf';
 import type { Relighter } from '../light/relighter';
 import { unshadowedLevel } from '../light/unshadowed';
 import { SkyBackground } from '../shaders/sky_background';
@@ -65,14 +65,25 @@ export class Viewer {
   static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>, relighter: Relighter): Promise<Viewer> {
     const model = await BakedModel.create(asset);
     const viewer = new Viewer(stage, asset, model, state, relighter);
-    const { order, channels, fixed, slots, scale, offset } = model.transfer;
-    await relighter.load({ shape: { order, channels, fixed, slots }, scale, offset, parts: model.workerData });
-    await viewer.relightOnce();
+    viewer.setLook();
+    const lit = Promise.all([viewer.relightOnce(), viewer.measureLevel()]);
+    model.setWhite(state.get().mode === 'light');
+    viewer.showSky();
+    stage.compile(); // while the worker computes
+    await lit;
     performance.mark('kiln:lit');
-    await viewer.measureLevel();
-    viewer.apply(new Set<keyof ViewState>(['ev', 'tone', 'background', 'wire', 'mode', 'compare']));
     stage.drawNow();
     return viewer;
+  }
+
+  /// What the first picture did without, and the functions above tell of.
+  complete(): void {
+    const { wire, mode, compare } = this.state.get();
+    const missing = new Set<keyof ViewState>();
+    if (wire) missing.add('wire');
+    if (isFalseColour(mode)) missing.add('mode');
+    if (compare !== null) missing.add('compare');
+    if (missing.size > 0) this.apply(missing);
   }
 
   private setPose(): void {
@@ -241,6 +252,5 @@ export class Viewer {
     this.background.dispose();
     this.pictures.dispose();
     this.model.dispose();
-    this.asset.dispose();
   }
 }

@@ -1,0 +1,196 @@
+// scene.glb as the server has it -> a plain GLB that any glTF loader reads by itself, and the transfer vectors apart.
+//
+// KHR_draco_mesh_compression becomes ordinary accessors, in both scenes; these share their compressed bytes, and each mesh is
+// decoded once. The transfer vectors, and the COLOR_0 that stands for them in other viewers, stay out of the GLB.
+
+import { DracoMesh, type DracoModule } from './draco_mesh';
+import { joinGlb, padded, splitGlb } from './glb';
+import { readExtension, type RadianceTransferExtension } from './kiln_reader';
+
+/// One baked primitive. Its vertices are in the order of the GLB's.
+export interface BakedPrimitive {
+  transfer: Float32Array[]; // _PRT_0.., 4 flat slots for each vertex
+  positions: Float32Array;
+  indices: Uint32Array;
+}
+
+export interface Unpacked {
+  file: ArrayBuffer;
+  extension: RadianceTransferExtension;
+  baked: BakedPrimitive[]; // in the order of the file
+}
+
+interface Json {
+  meshes?: { primitives: Primitive[] }[];
+  accessors?: Accessor[];
+  bufferViews?: BufferView[];
+  buffers?: { byteLength: number }[];
+  images?: { bufferView?: number }[];
+  extensionsUsed?: string[];
+  extensionsRequired?: string[];
+}
+
+interface Primitive {
+  attributes: Record<string, number>;
+  indices: number;
+  extensions?: { [kDraco]?: Compressed; KILN_radiance_transfer?: unknown };
+}
+
+interface Compressed {
+  bufferView: number;
+  attributes: Record<string, number>; // Draco's ids
+}
+
+interface Accessor {
+  bufferView?: number;
+  byteOffset?: number;
+  componentType: number;
+  count: number;
+  type: string;
+}
+
+interface BufferView {
+  buffer: number;
+  byteOffset?: number;
+  byteLength: number;
+}
+
+const kDraco = 'KHR_draco_mesh_compression';
+const [kUnsignedInt, kFloat] = [5125, 5126];
+const kComponents: Record<string, number> = { VEC2: 2, VEC3: 3, VEC4: 4 };
+
+/// Throws, in words, on a file that is not as core/artifact/README.md says.
+export function unpack(draco: DracoModule, packed: ArrayBuffer): Unpacked {
+  const { json: parsed, binary } = splitGlb(packed);
+  const extension = readExtension(parsed);
+  if (!extension) throw new Error('this glTF carries no KILN_radiance_transfer');
+  const json = parsed as Json;
+  const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
+  const baked = new Map<Primitive, BakedPrimitive>();
+  const out = new Binary();
+  moveImages(json, binary, out);
+  const accessors: Accessor[] = [];
+  for (const [bytes, sharing] of byCompressedBytes(primitives, json, binary)) {
+    const mesh = new DracoMesh(draco, bytes);
+    try {
+      for (const primitive of sharing) {
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension));
+        makePlain(primitive, json, mesh, { accessors, out });
+      }
+    } finally {
+      mesh.dispose();
+    }
+  }
+  json.accessors = accessors;
+  json.bufferViews = out.views;
+  json.buffers = [{ byteLength: out.length }];
+  json.extensionsUsed = json.extensionsUsed?.filter((name) => name !== kDraco);
+  json.extensionsRequired = json.extensionsRequired?.filter((name) => name !== kDraco);
+  return {
+    file: joinGlb(json, out.pieces),
+    extension,
+    baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
+  };
+}
+
+const isBaked = ({ extensions }: Primitive): boolean => extensions?.KILN_radiance_transfer !== undefined;
+
+/// The binary chunk that is written.
+class Binary {
+  readonly views: BufferView[] = [];
+  readonly pieces: Uint8Array[] = [];
+  length = 0;
+  private readonly known = new Map<ArrayBufferView<ArrayBuffer>, number>();
+
+  /// The buffer view of these numbers. The same array again is the same view.
+  add(array: ArrayBufferView<ArrayBuffer>): number {
+    const known = this.known.get(array);
+    if (known !== undefined) return known;
+    const { buffer, byteOffset, byteLength } = array;
+    this.pieces.push(new Uint8Array(buffer, byteOffset, byteLength));
+    this.known.set(array, this.views.length);
+    this.views.push({ buffer: 0, byteOffset: this.length, byteLength });
+    this.length += padded(byteLength);
+    return this.views.length - 1;
+  }
+}
+
+function bytesOf(json: Json, binary: Uint8Array<ArrayBuffer>, index: number): Uint8Array<ArrayBuffer> {
+  const { byteOffset = 0, byteLength } = entry(json.bufferViews, index, 'buffer view');
+  if (!(byteOffset >= 0 && byteLength >= 0 && byteOffset + byteLength <= binary.byteLength))
+    throw new Error(`buffer view ${index} reaches beyond the end of the file`);
+  return binary.subarray(byteOffset, byteOffset + byteLength);
+}
+
+function entry<T>(list: T[] | undefined, index: number, what: string): T {
+  const found = list?.[index];
+  if (found === undefined) throw new Error(`the file has no ${what} ${index}, which it refers to`);
+  return found;
+}
+
+function moveImages(json: Json, binary: Uint8Array<ArrayBuffer>, out: Binary): void {
+  for (const image of json.images ?? [])
+    if (image.bufferView !== undefined) image.bufferView = out.add(bytesOf(json, binary, image.bufferView));
+}
+
+/// The primitives of both scenes, those together that are decoded from the same bytes.
+function byCompressedBytes(
+  primitives: readonly Primitive[],
+  json: Json,
+  binary: Uint8Array<ArrayBuffer>,
+): [Uint8Array<ArrayBuffer>, Primitive[]][] {
+  const groups = new Map<string, [Uint8Array<ArrayBuffer>, Primitive[]]>();
+  for (const primitive of primitives) {
+    const compressed = primitive.extensions?.[kDraco];
+    if (!compressed) throw new Error(`a primitive is not compressed with ${kDraco}`);
+    const bytes = bytesOf(json, binary, compressed.bufferView);
+    const key = `${bytes.byteOffset} ${bytes.byteLength}`;
+    const group = groups.get(key);
+    if (group) group[1].push(primitive);
+    else groups.set(key, [bytes, [primitive]]);
+  }
+  return [...groups.values()];
+}
+
+/// Moves the transfer vectors and what stands for them out of the primitive.
+function takeBaked(primitive: Primitive, mesh: DracoMesh, { attributes }: RadianceTransferExtension): BakedPrimitive {
+  const ids = primitive.extensions![kDraco]!.attributes;
+  const take = (name: string, components: number) => {
+    if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
+    return mesh.floats(ids[name], components);
+  };
+  const out = {
+    transfer: attributes.map((name) => take(name, 4)),
+    positions: take('POSITION', 3),
+    indices: mesh.indices(),
+  };
+  for (const name of [...attributes, 'COLOR_0']) delete primitive.attributes[name];
+  return out;
+}
+
+/// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from
+/// under the other.)
+function makePlain(
+  primitive: Primitive,
+  json: Json,
+  mesh: DracoMesh,
+  { accessors, out }: { accessors: Accessor[]; out: Binary },
+): void {
+  const ids = primitive.extensions![kDraco]!.attributes;
+  for (const [name, index] of Object.entries(primitive.attributes)) {
+    const accessor = entry(json.accessors, index, 'accessor');
+    if (accessor.componentType !== kFloat || !kComponents[accessor.type] || ids[name] === undefined)
+      throw new Error(`attribute ${name} is not one of compressed floats`);
+    const bufferView = out.add(mesh.floats(ids[name], kComponents[accessor.type]));
+    primitive.attributes[name] = accessors.push({ ...accessor, bufferView, byteOffset: 0, count: mesh.points }) - 1;
+  }
+  const indices = mesh.indices();
+  primitive.indices =
+    accessors.push({
+      bufferView: out.add(indices),
+      componentType: kUnsignedInt,
+      count: indices.length,
+      type: 'SCALAR',
+    }) - 1;
+  delete primitive.extensions![kDraco];
+}

@@ -1,0 +1,81 @@
+// The entry of `/view/{id}`, kept small so that it runs early: asks for the job, sets the light worker to fetch and decode its
+// scene.glb, and makes the WebGL context. three.js and all that uses it (view.ts) arrive meanwhile.
+
+import { artifact, artifactUrl, explain, finished, follow, getJob, type Job } from '../asset/jobs';
+import { Relighter } from '../light/relighter';
+import { announce } from '../ui/dom';
+import { bytes } from '../ui/format';
+import { applyTheme } from '../ui/theme';
+import { Page } from './page';
+import { createContext } from './webgl';
+
+applyTheme();
+
+/// Resolves with the finished job; shows its progress until then.
+function whenFinished(job: Job, page: Page): Promise<Job> {
+  const { id, overlay } = page;
+  if (finished(job)) return Promise.resolve(job);
+  overlay.show(`The job is ${job.status}`, null);
+  return new Promise((resolve) => {
+    const stop = follow(id, {
+      job: (news) => {
+        announce(`The job is ${news.status}`);
+        if (!finished(news)) return overlay.show(`The job is ${news.status}`, null);
+        stop();
+        resolve(news);
+      },
+      progress: (_id, { stage, fraction }) =>
+        overlay.show(`Baking: ${stage}, ${Math.floor(100 * fraction)} %`, fraction),
+    });
+    page.onDispose(stop);
+  });
+}
+
+function checkShowable(job: Job): void {
+  if (job.status !== 'succeeded' || !artifact(job, 'scene.glb'))
+    throw new Error(job.error ? explain(job.error) : `The job is ${job.status}; there is nothing to show.`);
+}
+
+/// `begun` resolves with the first that is heard of it.
+function openScene(url: string, relighter: Relighter, { overlay }: Page) {
+  let hear = () => {};
+  const heard = new Promise<void>((resolve) => (hear = resolve));
+  const opened = relighter.open(url, ({ loaded, total }) => {
+    hear();
+    const [text, fraction] = total ? [`${bytes(loaded)} of ${bytes(total)}`, loaded / total] : [bytes(loaded), null];
+    overlay.show(`Loading ${text}`, fraction);
+  });
+  return { opened, begun: Promise.race([heard, opened]) };
+}
+
+async function open(page: Page): Promise<void> {
+  const relighter = new Relighter();
+  page.onDispose(() => relighter.dispose());
+  const viewer = import('./view');
+  viewer.catch(() => undefined); // is awaited below
+  const asked = await getJob(page.id);
+  page.title.textContent = asked.label || page.id;
+  document.title = `${asked.label || page.id} – Kiln`;
+  const job = await whenFinished(asked, page);
+  checkShowable(job);
+  const { opened, begun } = openScene(artifactUrl(job, 'scene.glb'), relighter, page);
+  await begun; // a worker cannot start while the next line blocks this thread
+  const context = createContext(page.canvas);
+  performance.mark('kiln:context');
+  const { show } = await viewer;
+  await show(page, job, { context, relighter, opened });
+}
+
+async function start(): Promise<void> {
+  performance.mark('kiln:script');
+  const page = new Page(decodeURIComponent(/\/view\/([^/]+)/.exec(location.pathname)?.[1] ?? ''));
+  page.overlay.show('Asking for the job', null);
+  try {
+    await open(page);
+  } catch (error) {
+    page.overlay.fail((error as Error).message);
+    page.dispose();
+  }
+}
+
+void start();
