@@ -158,6 +158,8 @@ export interface Report {
     streams?: { name: string; bytes: number }[];
   };
   warnings?: { code: string; message: string; where?: string }[];
+  error_sources?: Record<string, number>; // squares that sum to the certificate's; truncation beside them
+  promise?: { kept: boolean; reason: string; passes: unknown[] };
   certificate?: {
     relrmse?: number;
     interval?: [number, number];
@@ -168,6 +170,7 @@ export interface Report {
     points?: number;
     samples?: number;
     lightings?: { name: string; relrmse: number }[];
+    seen?: { relrmse: number; interval?: [number, number] }; // at the points that can be seen, when some cannot
     job_light?: { relrmse: number; interval?: [number, number] }; // its own light in full detail, lamps and all
   };
 }

@@ -9,6 +9,7 @@ export class Relighter {
   private readonly worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
   private readonly waiting = new Map<number, Answer>();
   private serial = 0;
+  private failure: Error | null = null; // a worker that has stopped answers nothing any more
 
   constructor() {
     this.worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => this.settle(data));
@@ -62,6 +63,7 @@ export class Relighter {
     const serial = ++this.serial;
     const transfer = [...new Set(give.map((array) => array.buffer))];
     return new Promise((resolve, reject) => {
+      if (this.failure) return reject(this.failure);
       this.waiting.set(serial, { resolve, reject, progress });
       this.worker.postMessage({ ...request, serial }, { transfer });
     });
@@ -76,6 +78,7 @@ export class Relighter {
   }
 
   private failAll(error: Error): void {
+    this.failure = error;
     for (const answer of this.waiting.values()) answer.reject(error);
     this.waiting.clear();
   }

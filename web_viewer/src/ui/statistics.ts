@@ -11,7 +11,7 @@ export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   const box = h('div', { class: 'statistics' }, pairs(sizes(viewer)));
   if (!report) return box;
   if (report.certificate?.relrmse !== undefined)
-    box.append(h('h3', {}, 'Certificate'), certificate(report.certificate));
+    box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
   if (report.warnings?.length)
     box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
   if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
@@ -40,9 +40,22 @@ const interval = (ends?: readonly [number, number]): string =>
 const withInterval = (c: { relrmse: number; interval?: [number, number] }): string =>
   percent(c.relrmse) + interval(c.interval);
 
-function certificate(c: NonNullable<Report['certificate']>): HTMLElement {
+const kSources: readonly (readonly [string, string])[] = [
+  ['noise', 'Error from noise'],
+  ['interpolation', 'from interpolation'],
+  ['bounce_tail', 'from bounces left out'],
+  ['quantisation', 'from quantisation'],
+  ['truncation', 'Own light cut by the order'],
+];
+
+const sources = (from: Report['error_sources']): Row[] =>
+  kSources.flatMap(([key, label]): Row[] => (from?.[key] === undefined ? [] : [[label, percent(from[key])]]));
+
+function certificate(c: NonNullable<Report['certificate']>, from: Report['error_sources']): HTMLElement {
   const rows: Row[] = [
+    ...(c.seen ? [['Where it can be seen', withInterval(c.seen)] as const] : []),
     ...(c.job_light ? [['Own light, in full detail', withInterval(c.job_light)] as const] : []),
+    ...sources(from),
     ['Without worst 1 %', percent(c.relrmse_without_worst_1pct)],
     ['99th percentile', percent(c.p99)],
     ['Bias', c.bias === undefined ? '–' : `${(100 * c.bias).toFixed(2).replace('-', '−')}\u00a0%`],
