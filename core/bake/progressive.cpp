@@ -29,8 +29,8 @@ std::string percent(double x) {
 Passes::Passes(const Promise& promise, const PrtStep& step, const Limits& limits)
     : promise_(promise), step_(step), limits_(limits) {}
 
-void Passes::add(PassRecord pass) {
-  all_.push_back(std::move(pass));
+void Passes::add(const PassRecord& pass) {
+  all_.push_back(pass);
   if (all_.back().high <= all_[best_].high || all_.back().order > all_[best_].order) best_ = all_.size() - 1;
 }
 

@@ -42,7 +42,7 @@ class Passes {
  public:
   Passes(const Promise&, const PrtStep&, const Limits&);
 
-  void add(PassRecord);
+  void add(const PassRecord&);
   const std::vector<PassRecord>& all() const { return all_; }
   /// The pass whose interval ends lowest: what is delivered.
   std::size_t best() const { return best_; }

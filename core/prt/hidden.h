@@ -9,9 +9,9 @@
 //         a solid. (The inside of double-sided faces is a room as well as a solid.)
 // Repeat  same results for any thread count
 
-#include <compare>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "core/base/threads.h"
@@ -38,11 +38,8 @@ struct StandIn {
 /// (vertex_points) not: then it stands in for itself.
 std::vector<StandIn> find_stand_ins(const Mesh&, const std::vector<bool>& dark, const HiddenTest&, Threads&);
 
-/// An edge of the mesh: vertices, a < b.
-struct MeshEdge {
-  std::uint32_t a, b;
-  friend auto operator<=>(const MeshEdge&, const MeshEdge&) = default;
-};
+/// An edge of the mesh: two vertices, the lower first.
+using MeshEdge = std::pair<std::uint32_t, std::uint32_t>;
 
 /// Which of some edges (ascending) have a middle that is hidden on one of their faces.
 std::vector<bool> hidden_middles(const Mesh&, const std::vector<MeshEdge>&, const HiddenTest&, Threads&);

@@ -90,7 +90,8 @@ TEST(Promise, ErrorSourcesAreSquaresThatSumToTheCertificate) {
   Threads threads;
   const auto output = bake(input_of("column", recipe_for(R"("draft")")), {}, threads);
   ASSERT_TRUE(output);
-  const json report = report_of(*output), sources = report["error_sources"];
+  const json report = report_of(*output);
+  const json& sources = report["error_sources"];
   double sum = 0;
   for (const char* name : {"noise", "interpolation", "bounce_tail", "quantisation"}) {
     const auto part = sources[name].get<double>();
