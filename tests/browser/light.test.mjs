@@ -7,7 +7,7 @@ import { load } from './sources.mjs';
 const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCount } = await load('light/sh.ts');
 const { sphereQuadrature } = await load('light/quadrature.ts');
 const { directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
-const { decodeAttributes, relight, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
+const { decodeAttribute, relight, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
 const { kSkies, projectSky } = await load('light/skies.ts');
 const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
 const { edgesOf } = await load('main/wireframe.ts');
@@ -140,7 +140,7 @@ test('halving a map keeps its integral', () => {
 });
 
 test('attributes decode to offset + scale * stored, four flat slots each, zero padding ignored', () => {
-  const shape = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
+  const slots = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
   const attributes = [
     Float32Array.of(0.1, 0.2, 0.3, 0.4, -0.1, -0.2, -0.3, -0.4),
     Float32Array.of(0.5, 0.6, 9, 9, -0.5, -0.6, 9, 9),
@@ -149,7 +149,8 @@ test('attributes decode to offset + scale * stored, four flat slots each, zero p
     [1, 2, 3, 4, 5, 6],
     [10, 20, 30, 40, 50, 60],
   ];
-  const out = decodeAttributes(shape, attributes, scale, offset);
+  const out = new Float32Array(12);
+  attributes.forEach((stored, k) => decodeAttribute({ ...slots, scale, offset }, k, stored, out));
   const stored = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
   for (let v = 0; v < 2; ++v)
     stored.forEach((s, slot) => near(out[6 * v + slot], offset[slot] + scale[slot] * (v === 0 ? s : -s), 1e-5));

@@ -63,35 +63,36 @@ export class DracoMesh {
   /// The attribute of Draco's unique `id`, `components` numbers for each point.
   floats(id: number, components: number): Float32Array<ArrayBuffer> {
     let out = this.read.get(id);
-    if (!out) this.read.set(id, (out = this.readFloats(id, components)));
+    if (!out) this.read.set(id, (out = this.lend(id, components, (numbers) => numbers.slice())));
     if (out.length !== components * this.points) throw new Error(`attribute ${id} has two meanings`);
     return out;
   }
 
+  /// The same numbers where the decoder has them, for as long as `use` runs: nothing is copied.
+  lend<T>(id: number, components: number, use: (numbers: Float32Array<ArrayBuffer>) => T): T {
+    const { draco, decoder, mesh } = this;
+    const attribute = decoder.GetAttributeByUniqueId(mesh, id);
+    if (attribute.ptr === 0 || attribute.num_components() !== components)
+      throw new Error(`the geometry has no attribute ${id} of ${components} components`);
+    const count = components * this.points;
+    return this.borrow(4 * count, (at) => {
+      const good = decoder.GetAttributeDataArrayForAllPoints(mesh, attribute, draco.DT_FLOAT32, 4 * count, at);
+      if (!good) throw new Error(`attribute ${id} of the geometry cannot be read`);
+      return use(draco.HEAPF32.subarray(at / 4, at / 4 + count));
+    });
+  }
+
   private readTriangles(): Uint32Array<ArrayBuffer> {
     const count = 3 * this.mesh.num_faces();
-    return this.lent(4 * count, (at) => {
+    return this.borrow(4 * count, (at) => {
       const good = this.decoder.GetTrianglesUInt32Array(this.mesh, 4 * count, at);
       if (!good) throw new Error('the triangles of the geometry cannot be read');
       return this.draco.HEAPU32.slice(at / 4, at / 4 + count);
     });
   }
 
-  private readFloats(id: number, components: number): Float32Array<ArrayBuffer> {
-    const { draco, decoder, mesh } = this;
-    const attribute = decoder.GetAttributeByUniqueId(mesh, id);
-    if (attribute.ptr === 0 || attribute.num_components() !== components)
-      throw new Error(`the geometry has no attribute ${id} of ${components} components`);
-    const count = components * this.points;
-    return this.lent(4 * count, (at) => {
-      const good = decoder.GetAttributeDataArrayForAllPoints(mesh, attribute, draco.DT_FLOAT32, 4 * count, at);
-      if (!good) throw new Error(`attribute ${id} of the geometry cannot be read`);
-      return draco.HEAPF32.slice(at / 4, at / 4 + count);
-    });
-  }
-
   /// `bytes` of the decoder's memory for as long as `use` runs.
-  private lent<T>(bytes: number, use: (at: number) => T): T {
+  private borrow<T>(bytes: number, use: (at: number) => T): T {
     const at = this.draco._malloc(bytes);
     try {
       return use(at);

@@ -3,13 +3,14 @@
 // KHR_draco_mesh_compression becomes ordinary accessors, in both scenes; these share their compressed bytes, and each mesh is
 // decoded once. The transfer vectors, and the COLOR_0 that stands for them in other viewers, stay out of the GLB.
 
+import { decodeAttribute } from '../light/transfer';
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
 import { readExtension, type RadianceTransferExtension } from './kiln_reader';
 
 /// One baked primitive. Its vertices are in the order of the GLB's.
 export interface BakedPrimitive {
-  transfer: Float32Array[]; // _PRT_0.., 4 flat slots for each vertex
+  coefficients: Float32Array; // as light/transfer.ts has them
   positions: Float32Array;
   indices: Uint32Array;
 }
@@ -152,20 +153,19 @@ function byCompressedBytes(
   return [...groups.values()];
 }
 
-/// Moves the transfer vectors and what stands for them out of the primitive.
-function takeBaked(primitive: Primitive, mesh: DracoMesh, { attributes }: RadianceTransferExtension): BakedPrimitive {
+/// Takes the transfer vectors, and what stands for them, out of the primitive.
+function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTransferExtension): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
-  const take = (name: string, components: number) => {
+  const idOf = (name: string) => {
     if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
-    return mesh.floats(ids[name], components);
+    return ids[name];
   };
-  const out = {
-    transfer: attributes.map((name) => take(name, 4)),
-    positions: take('POSITION', 3),
-    indices: mesh.indices(),
-  };
-  for (const name of [...attributes, 'COLOR_0']) delete primitive.attributes[name];
-  return out;
+  const coefficients = new Float32Array(mesh.points * extension.channels * extension.slots);
+  extension.attributes.forEach((name, k) =>
+    mesh.lend(idOf(name), 4, (stored) => decodeAttribute(extension, k, stored, coefficients)),
+  );
+  for (const name of [...extension.attributes, 'COLOR_0']) delete primitive.attributes[name];
+  return { coefficients, positions: mesh.floats(idOf('POSITION'), 3), indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

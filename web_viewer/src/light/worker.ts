@@ -2,16 +2,10 @@
 
 import { download } from '../asset/download';
 import { loadDraco } from '../asset/draco_module';
-import { unpack } from '../asset/unpack';
+import { unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
-import { decodeAttributes, pickCoefficient, quantile, relight, triangleMeasure, type TransferShape } from './transfer';
-
-interface Part {
-  coefficients: Float32Array;
-  positions: Float32Array;
-  indices: Uint32Array;
-}
+import { pickCoefficient, quantile, relight, triangleMeasure, type TransferShape } from './transfer';
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
@@ -20,19 +14,13 @@ const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
 
 let shape: TransferShape = { order: 0, channels: 1, fixed: false, slots: 0 };
-let parts: Part[] = [];
+let parts: BakedPrimitive[] = [];
 
-/// Answers as soon as the page can go on; the coefficients are decoded while it does.
 async function open({ url }: OpenRequest, serial: number): Promise<void> {
   const packed = await download(url, (loaded, total) => send({ serial, progress: { loaded, total } }));
   const { file, extension, baked } = unpack(await decoder, packed);
+  [shape, parts] = [extension, baked];
   send({ serial, opened: { file, bytes: packed.byteLength } }, [file]);
-  shape = extension;
-  parts = baked.map(({ transfer, positions, indices }) => ({
-    coefficients: decodeAttributes(shape, transfer, extension.scale, extension.offset),
-    positions,
-    indices,
-  }));
 }
 
 /// Lamps count: they are there whatever the sky.
