@@ -51,33 +51,26 @@ export interface RadianceTransfer extends RadianceTransferExtension {
 /// The part of GLTFLoader's result that is read here.
 export interface LoadedGltf {
   scene: Object3D;
-  parser: { json: unknown; associations: Map<unknown, { meshes?: number; primitives?: number }> };
+  parser: { json: unknown };
 }
 
 const kName = 'KILN_radiance_transfer';
-interface GltfJson {
-  extensions?: Record<string, unknown>;
-  meshes?: { primitives: { extensions?: Record<string, unknown> }[] }[];
-}
-
 /// The root extension of a glTF; undefined: not one of ours. Throws on a version or shape it does not know.
 export function readExtension(json: unknown): RadianceTransferExtension | undefined {
-  const extension = (json as GltfJson).extensions?.[kName] as RadianceTransferExtension | undefined;
+  const extension = (json as { extensions?: Record<string, unknown> }).extensions?.[kName] as RadianceTransferExtension | undefined;
   if (extension) checkShape(extension);
   return extension;
 }
 
 /// Reads the extension and finds its primitives in the default scene. Throws on a version or shape it does not know.
 export function readRadianceTransfer(gltf: LoadedGltf): RadianceTransfer | undefined {
-  const json = gltf.parser.json as GltfJson;
-  const extension = readExtension(json);
+  const extension = readExtension(gltf.parser.json);
   if (!extension) return undefined;
   const parts: TransferPart[] = [];
   gltf.scene.traverse((object) => {
     const mesh = object as Mesh;
-    const place = gltf.parser.associations.get(mesh);
-    const primitive = json.meshes?.[place?.meshes ?? -1]?.primitives[place?.primitives ?? 0];
-    const own = primitive?.extensions?.[kName] as Partial<TransferPart> | undefined;
+    // Not by parser.associations: of a file with two scenes they hold the one that happened to load last.
+    const own = (mesh.userData.gltfExtensions as Record<string, Partial<TransferPart>> | undefined)?.[kName];
     if (!mesh.isMesh || !own) return;
     parts.push({
       mesh,
