@@ -9,6 +9,7 @@ import { pickCoefficient, quantile, relight, triangleMeasure, type TransferShape
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
+const kNewsEvery = 100; // ms between two pieces of news of the download: each is a repaint
 
 const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
@@ -17,7 +18,12 @@ let shape: TransferShape = { order: 0, channels: 1, fixed: false, slots: 0 };
 let parts: BakedPrimitive[] = [];
 
 async function open({ url }: OpenRequest, serial: number): Promise<void> {
-  const packed = await download(url, (loaded, total) => send({ serial, progress: { loaded, total } }));
+  let next = 0;
+  const packed = await download(url, (loaded, total) => {
+    if (performance.now() < next) return;
+    next = performance.now() + kNewsEvery;
+    send({ serial, progress: { loaded, total } });
+  });
   const { file, extension, baked } = unpack(await decoder, packed);
   [shape, parts] = [extension, baked];
   send({ serial, opened: { file, bytes: packed.byteLength } }, [file]);
