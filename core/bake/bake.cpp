@@ -158,7 +158,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
     return bake_pass(input, scene, light, std::move(plan), log, threads);
   }
   const Mesh surface = scene.mesh;
-  std::optional<Pass> best;
+  std::optional<Pass> newest;
   std::optional<Plan> next = std::move(plan);
   for (double done = kFirst; next; done += kShare * (kLast - done)) {
     scene.mesh = surface;
@@ -167,13 +167,12 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
     log.share(done, done + kShare * (kLast - done));
     KILN_TRY(pass, bake_pass(input, scene, light, *next, log, threads));
     passes.add(record_of(pass, log.seconds() - start, log.rays() - rays));
-    log.know_error(passes.all()[passes.best()].relrmse);
-    const Plan last = pass.plan;
-    if (passes.best() + 1 == passes.all().size()) best = std::move(pass);
+    log.know_error(passes.all().back().relrmse);
+    newest = std::move(pass);
     scene.mesh = surface;
-    next = passes.next(last, scene, log.seconds(), threads.count());
+    next = passes.next(newest->plan, scene, log.seconds(), threads.count());
   }
-  return std::move(*best);
+  return std::move(*newest);
 }
 
 }  // namespace

@@ -18,6 +18,9 @@ constexpr double kMaxRays = 65536;
 
 double square(double x) { return x * x; }
 
+/// Seconds that grow with rays and triangles.
+double work(const PassRecord& pass) { return std::max(1e-3, pass.seconds - pass.certificate_seconds); }
+
 std::string percent(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g %%", 100 * x);
@@ -29,10 +32,7 @@ std::string percent(double x) {
 Passes::Passes(const Promise& promise, const PrtStep& step, const Limits& limits)
     : promise_(promise), step_(step), limits_(limits) {}
 
-void Passes::add(const PassRecord& pass) {
-  all_.push_back(pass);
-  if (all_.back().high <= all_[best_].high || all_.back().order > all_[best_].order) best_ = all_.size() - 1;
-}
+void Passes::add(const PassRecord& pass) { all_.push_back(pass); }
 
 std::optional<Plan> Passes::end(Ending ending, std::string reason) {
   outlook_ = {ending, std::move(reason)};
@@ -59,7 +59,21 @@ double Passes::time_growth(double elapsed_s) const {
   const double budget = promise_.time_budget_s.value_or(kShareOfWall * limits_.wall_s);
   const double reserve = std::max(0.2, 0.04 * budget);  // preview and report
   const double left = budget - reserve - elapsed_s - now.certificate_seconds;
-  return left / std::max(1e-3, now.seconds - now.certificate_seconds);
+  return left / work(now);
+}
+
+/// Seconds of a triangle are a + b rays, from the last two passes; b rays alone until two differ in rays.
+double Passes::cost(Growth growth) const {
+  const PassRecord& now = all_.back();
+  const PassRecord* before = all_.size() > 1 ? &all_[all_.size() - 2] : nullptr;
+  double share = 1;  // of the rays in the last pass's work
+  if (before && before->order == now.order && before->samples < now.samples) {
+    const double rate = work(now) / static_cast<double>(now.triangles);
+    const double slope =
+        (rate - work(*before) / static_cast<double>(before->triangles)) / (now.samples - before->samples);
+    share = std::clamp(slope * now.samples / rate, 0.2, 1.0);
+  }
+  return growth.triangles * (1 - share + share * growth.samples);
 }
 
 /// From two passes of one order that differ in triangles; three quarters until there are such.
@@ -93,12 +107,12 @@ Passes::Growth Passes::towards(double wanted) const {
   return growth;
 }
 
-/// The lowest error that a growth of `cost` buys.
-Passes::Growth Passes::within(double cost) const {
+/// The lowest error that a cost of `most` buys.
+Passes::Growth Passes::within(double most) const {
   double cheap = std::max(all_.back().relrmse, 1e-6), dear = cheap / 64;
   for (int i = 0; i < 32; ++i) {
     const double middle = std::sqrt(cheap * dear);
-    (towards(middle).cost() > cost ? dear : cheap) = middle;
+    (cost(towards(middle)) > most ? dear : cheap) = middle;
   }
   return towards(cheap);
 }
@@ -121,7 +135,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   plan.prediction = predict(plan, scene, threads);
   if (plan.prediction.memory_bytes > limits_.memory_mb << 20) {
     return end(Ending::floor,
-               "reached " + percent(all_[best_].high) + "; more triangles would need more than /limits/memory_mb");
+               "reached " + percent(all_.back().high) + "; more triangles would need more than /limits/memory_mb");
   }
   for (Decision& d : plan.decisions) {
     const std::string reason = "pass " + std::to_string(all_.size() + 1) + ", from the error of the last one";
@@ -164,12 +178,12 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double el
   }
   const double affordable = time_growth(elapsed_s);
   if (affordable < kLeastGrowth) {
-    return promise_.time_budget_s ? end(Ending::time_spent, "the time is spent; reached " + percent(all_[best_].high))
-                                  : end(Ending::floor, "reached " + percent(all_[best_].high) +
+    return promise_.time_budget_s ? end(Ending::time_spent, "the time is spent; reached " + percent(all_.back().high))
+                                  : end(Ending::floor, "reached " + percent(all_.back().high) +
                                                            "; another pass would need more than /limits/wall_s");
   }
   const std::string floor =
-      "reached " + percent(all_[best_].high) + " of " + percent(promise_.target_error.value_or(0)) + ": ";
+      "reached " + percent(all_.back().high) + " of " + percent(promise_.target_error.value_or(0)) + ": ";
   if (all_.size() >= kMostPasses) return end(Ending::floor, floor + "the last of ten passes has ended");
   if (stuck())
     return end(Ending::floor,
@@ -180,15 +194,15 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double el
   Growth growth = within(most);
   if (promise_.target_error) {
     const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
-    if (const Growth wanted = towards(aim); wanted.cost() < most) growth = wanted;
+    if (const Growth wanted = towards(aim); cost(wanted) < most) growth = wanted;
   }
-  if (growth.cost() < 1.05) {
+  if (cost(growth) < 1.05) {
     const bool free_samples = !step_.samples;
     if (free_samples && free_triangles()) {
       growth = {kLeastGrowth, kLeastGrowth};
     } else {
       return end(promise_.target_error ? Ending::floor : Ending::time_spent,
-                 "reached " + percent(all_[best_].high) + "; what is left comes from what the recipe fixes: " +
+                 "reached " + percent(all_.back().high) + "; what is left comes from what the recipe fixes: " +
                      (free_samples ? "/steps/0/subdivide" : "/steps/0/samples"));
     }
   }

@@ -2,9 +2,10 @@
 // The progressive loop: a bake that promised an error or a time advances in passes, and each ends with a whole,
 // certified artefact. After a pass the next is planned from where the error of the last came from.
 //
-//   noise ~ 1 / sqrt(rays a vertex),  interpolation ~ triangles^-p,  cost ~ rays x triangles
-// so that of a wanted squared error the cheapest share for interpolation is 1 / (1 + 2 p): the rest is noise.
-// Passes begin afresh with more of both: with a growth of four the earlier ones cost a third of the last.
+//   noise ~ 1 / sqrt(rays a vertex),  interpolation ~ triangles^-p,  seconds ~ triangles (a + b rays)
+// so that of a wanted squared error the cheapest share for interpolation is about 1 / (1 + 2 p): the rest is noise.
+// Passes begin afresh with more of both: with a growth of four the earlier ones cost a third of the last. The newest is
+// delivered, not the one whose certificate was luckiest.
 // Repeat  a target alone gives the same passes and bytes on any machine that is not stopped by limits.wall_s; a time
 //         budget cannot.
 
@@ -44,8 +45,6 @@ class Passes {
 
   void add(const PassRecord&);
   const std::vector<PassRecord>& all() const { return all_; }
-  /// The pass whose interval ends lowest: what is delivered.
-  std::size_t best() const { return best_; }
 
   /// The plan of the next pass; nothing when the promise is kept or cannot be, as outlook() then says.
   /// `last` is the plan of the newest pass, `input_triangles` and the scene's size limit what can grow,
@@ -57,7 +56,6 @@ class Passes {
  private:
   struct Growth {
     double samples = 1, triangles = 1;
-    double cost() const { return samples * triangles; }
   };
   std::optional<Plan> end(Outlook::Ending, std::string reason);
   bool transport_met() const;
@@ -65,9 +63,10 @@ class Passes {
   bool stuck() const;
   bool free_triangles() const;  // the recipe leaves their number open
   double time_growth(double elapsed_s) const;
+  double cost(Growth) const;  // in works of the last pass
   double interpolation_power() const;
   Growth towards(double wanted) const;
-  Growth within(double cost) const;
+  Growth within(double most) const;
   std::optional<Plan> higher_order(const Plan& last, const Scene&, double elapsed_s, int threads);
   std::optional<Plan> grown(const Plan& last, Growth, const Scene&, int threads);
 
@@ -75,7 +74,6 @@ class Passes {
   PrtStep step_;
   Limits limits_;
   std::vector<PassRecord> all_;
-  std::size_t best_ = 0;
   Outlook outlook_;
 };
 

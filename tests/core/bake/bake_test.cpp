@@ -7,26 +7,16 @@
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/baked_scene.h"
-#include "core/bake/demo_scene.h"
+#include "tests/core/bake/bake_input.h"
 
 namespace kiln {
 namespace {
 
-BakeInput input_of(const std::string& scene, const std::string& recipe) {
-  BakeInput input;
-  input.scene.name = scene + ".glb";
-  input.scene.main = *demo_scene(scene);
-  input.recipe = *parse_recipe(recipe);
-  return input;
-}
+using testing::file;
+using testing::input_of;
+using testing::report_of;
 
 BakeInput column_input(const std::string& recipe) { return input_of("column", recipe); }
-
-const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
-}
-
-nlohmann::json report_of(const BakeOutput& output) { return nlohmann::json::parse(file(output, "report.json")); }
 
 constexpr const char* kSmall =
     R"({"environment":{"builtin":"clear"},"steps":[{"do":"prt","order":4,"samples":256,"bounces":2,"subdivide":{"triangles":6000}}]})";

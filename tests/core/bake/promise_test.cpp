@@ -8,28 +8,18 @@
 #include "core/artifact/baked_scene.h"
 #include "core/bake/bake.h"
 #include "core/bake/certificate.h"
-#include "core/bake/demo_scene.h"
 #include "core/bake/job_light.h"
 #include "core/bake/progressive.h"
+#include "tests/core/bake/bake_input.h"
 
 namespace kiln {
 namespace {
 
 using nlohmann::json;
 
-BakeInput input_of(const std::string& scene, const std::string& recipe) {
-  BakeInput input;
-  input.scene.name = scene + ".glb";
-  input.scene.main = *demo_scene(scene);
-  input.recipe = *parse_recipe(recipe);
-  return input;
-}
-
-const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
-}
-
-json report_of(const BakeOutput& output) { return json::parse(file(output, "report.json")); }
+using testing::file;
+using testing::input_of;
+using testing::report_of;
 
 std::string recipe_for(const std::string& quality, const std::string& more = "") {
   return R"({"environment":{"builtin":"clear"},"quality":)" + quality + R"(,"steps":[{"do":"prt","order":3)" + more +
@@ -160,6 +150,24 @@ TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
   EXPECT_FALSE(passes.next({}, Scene{}, 1, 1));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::target_met);
   EXPECT_TRUE(passes.kept());
+}
+
+TEST(Promise, TheCostOfRaysIsLearntFromTwoPasses) {
+  // Four times the rays took twice the time: a pass of eight times the time may take far more than eight times the
+  // rays' worth of a model in which time is rays alone.
+  Passes passes({.time_budget_s = 9}, {.order = 6, .subdivide = {.mode = PrtStep::Subdivision::Mode::off}}, {});
+  PassRecord first = pass_with(0.05, 0.001), second = first;
+  first.samples = 16;
+  first.seconds = 0.5;
+  passes.add(first);
+  passes.add(second);
+  Plan plan;
+  plan.samples = second.samples;
+  const auto next = passes.next(plan, Scene{}, 5.6, 1);  // 3 s are left for what took 1 s
+  ASSERT_TRUE(next);
+  // a + 16 b = .5 and a + 64 b = 1: b = 1 / 96, a = 1 / 3, and 2.7 s are 227 rays; 173 by rays alone.
+  EXPECT_GT(next->samples, 192);
+  EXPECT_LE(next->samples, 240);
 }
 
 TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
