@@ -106,7 +106,8 @@ std::string promise_text(std::string_view report) {
   out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + ", interpolation " +
          percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
          percent_text(number_of(sources, "bounce_tail")) + ", quantisation " +
-         percent_text(number_of(sources, "quantisation"));
+         percent_text(number_of(sources, "quantisation")) + ", compression " +
+         percent_text(number_of(sources, "compression"));
   return out;
 }
 

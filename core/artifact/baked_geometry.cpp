@@ -115,10 +115,10 @@ class PrimitiveBuilder {
     add({"_ALBEDO", true, false}, original_color(material.base_color));
   }
 
-  void add_coefficients(const SlotRanges& ranges, int bits) {
-    for (std::size_t k = 0; k < slot_vec4s(baked_.transfer.stride()); ++k) {
+  void add_coefficients(const StoredTransfer& transfer) {
+    for (std::size_t k = 0; k < vec4s_of(transfer.form().count()); ++k) {
       add({"_PRT_" + std::to_string(k), true, false},
-          {StreamKind::generic, 4, bits, {-1, -1, -1, -1}, 2, pack_slots(baked_.transfer, ranges, k, vertices_)});
+          {StreamKind::generic, 4, transfer.bits(k), {-1, -1, -1, -1}, 2, transfer.pack(k, vertices_)});
     }
   }
 
@@ -177,7 +177,7 @@ Result<void> visit_part_primitives(const BakedScene& baked, const GeometryOption
     PrimitiveBuilder builder(baked, static_cast<std::uint32_t>(part), std::move(meshes[part]));
     builder.add_geometry(options.encoding);
     builder.add_colors(colors);
-    if (options.ranges) builder.add_coefficients(*options.ranges, options.encoding.coefficient_bits);
+    if (options.transfer) builder.add_coefficients(*options.transfer);
     if (auto done = visit(builder.take()); !done) return done;
   }
   return {};

@@ -9,7 +9,7 @@
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/draco_codec.h"
-#include "core/artifact/prt_slots.h"
+#include "core/artifact/stored_transfer.h"
 
 namespace kiln {
 
@@ -32,7 +32,7 @@ std::vector<std::uint32_t> used_vertices(const Mesh&);
 
 struct GeometryOptions {
   Encoding encoding;
-  const SlotRanges* ranges = nullptr;  // of the coefficients; null leaves them out (to measure sizes)
+  const StoredTransfer* transfer = nullptr;  // null leaves the coefficients out (to measure sizes)
 };
 
 /// Takes one part at a time, so that no more than one part's streams are in memory. A fault ends the visit.

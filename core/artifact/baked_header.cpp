@@ -39,8 +39,8 @@ std::vector<double> numbers(const json& array, const std::string& place, std::si
 }
 
 void check_conventions(const Fields& extension, Findings& findings) {
-  if (extension.count("version", 0) != 1) {
-    findings.fail("unsupported_version", "Only version 1 of KILN_radiance_transfer is read.",
+  if (extension.count("version", 0) != 2) {
+    findings.fail("unsupported_version", "Only version 2 of KILN_radiance_transfer is read.",
                   extension.pointer("version"));
   }
   if (extension.text("basis") != "real-sh" || extension.flag("condonShortley", true)) {
@@ -68,14 +68,37 @@ Transfer read_shape(const Fields& extension, Findings& findings) {
   return out;
 }
 
-void check_attribute_names(const Fields& extension, const Transfer& shape, Findings& findings) {
+void check_attribute_names(const Fields& extension, std::size_t numbers, Findings& findings) {
   const std::vector<std::string> names = extension.texts("attributes");
-  bool right = names.size() == slot_vec4s(shape.stride());
+  bool right = names.size() == vec4s_of(numbers);
   for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == "_PRT_" + std::to_string(k);
   if (!right) {
-    findings.fail("slot_count_mismatch", "The attributes must be _PRT_0 and on, four slots in each.",
+    findings.fail("slot_count_mismatch", "The attributes must be _PRT_0 and on, four numbers in each.",
                   extension.pointer("attributes"));
   }
+}
+
+/// Leaves `form` raw, or with rows of zeros for the caller to fill.
+void read_form(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+  if (const std::string form = extension.text("form"); form == "components") {
+    const Fields components = extension.object("components");
+    const std::uint64_t rank = components.count("rank", 0);
+    if (rank < 1 || rank > out.shape.stride()) {
+      findings.fail("number_out_of_range", "There must be at least one component, and no more than slots.",
+                    components.pointer("rank"));
+      return;
+    }
+    out.components_view = components.index("bufferView", 1u << 30);
+    out.form.components = {out.shape.stride(), std::vector<float>((rank + 1) * out.shape.stride())};
+  } else if (form != "raw") {
+    findings.fail("not_a_baked_scene", "The form must be raw or components.", extension.pointer("form"));
+    return;
+  }
+  const std::size_t count = out.form.expected_count(out.shape);
+  check_attribute_names(extension, count, findings);
+  const std::string scale = std::string(kPlace) + "/scale", offset = std::string(kPlace) + "/offset";
+  out.form.scale = numbers(at(root, scale), scale, count, findings);
+  out.form.offset = numbers(at(root, offset), offset, count, findings);
 }
 
 BakedLight read_light(const json& root, const Fields& extension, int order, Findings& findings) {
@@ -131,11 +154,7 @@ BakedHeader read_baked_header(std::span<const std::uint8_t> text, Findings& find
   check_conventions(extension, findings);
   out.shape = read_shape(extension, findings);
   if (findings.failed()) return out;
-  check_attribute_names(extension, out.shape, findings);
-  out.ranges.scale =
-      numbers(at(root, std::string(kPlace) + "/scale"), std::string(kPlace) + "/scale", out.shape.stride(), findings);
-  out.ranges.offset =
-      numbers(at(root, std::string(kPlace) + "/offset"), std::string(kPlace) + "/offset", out.shape.stride(), findings);
+  read_form(root, extension, out, findings);
   out.light = read_light(root, extension, out.shape.order, findings);
   out.exposure = read_exposure(extension, findings);
   const json& provenance = at(root, "/asset/extras/kiln");

@@ -8,7 +8,7 @@
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/findings.h"
-#include "core/artifact/prt_slots.h"
+#include "core/artifact/stored_transfer.h"
 
 namespace kiln {
 
@@ -17,8 +17,9 @@ struct BakedHeader {
     std::string name;
     int material = 0;  // checked against the materials by the caller
   };
-  Transfer shape;  // order, channels, fixed; no coefficients
-  SlotRanges ranges;
+  Transfer shape;            // order, channels, fixed; no coefficients
+  StoredForm form;           // of components only the shape: their numbers are in a buffer view
+  int components_view = -1;  // checked against the buffer views by the caller; -1: raw
   BakedLight light;
   float exposure = 1;
   std::string provenance;

@@ -8,6 +8,7 @@
 
 #include "core/artifact/import.h"
 #include "core/base/result.h"
+#include "core/prt/components.h"
 #include "core/prt/transfer.h"
 #include "core/scene/scene.h"
 
@@ -27,12 +28,20 @@ struct BakedScene {
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
 };
 
+/// How transfer vectors are stored (stored_transfer.h): raw, or as weights of components.
+struct TransferEncoding {
+  int bits = 12;               // of a number over its own range
+  Components components;       // none: raw
+  std::vector<float> weights;  // of the components, rank for each vertex
+  double weight_step = 0;      // weights are rounded to steps of at most this; 0: to `bits`
+};
+
 struct Encoding {
   int position_bits = 16;  // over the unit cube, one grid for all primitives (no cracks)
   int normal_bits = 12;
   int texcoord_bits = 14;
-  int coefficient_bits = 12;  // of each _PRT_n slot over its own range
-  int speed = 7;              // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
+  TransferEncoding transfer;
+  int speed = 7;  // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
 };
 
 /// The bytes of a GLB. Draco reorders vertices: what read_baked_glb gives back is the delivered order.

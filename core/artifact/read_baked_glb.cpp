@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/artifact/baked_header.h"
 #include "core/artifact/baked_scene.h"
@@ -136,10 +137,20 @@ void check_geometry(const Mesh& mesh, std::size_t first, const std::string& plac
 
 void read_coefficients(const BakedFile& file, StreamReader& streams, std::size_t first, std::size_t vertices,
                        Transfer& out) {
-  out.coefficients.resize((first + vertices) * out.stride());
-  for (std::size_t k = 0; k < slot_vec4s(out.stride()); ++k) {
-    unpack_slots(out, file.header.ranges, k, first, streams.take("_PRT_" + std::to_string(k), 4));
+  const StoredForm& form = file.header.form;
+  const std::size_t count = form.count();
+  std::vector<float> numbers(vertices * count);
+  for (std::size_t k = 0; k < vec4s_of(count); ++k) {
+    const std::vector<float> stored = streams.take("_PRT_" + std::to_string(k), 4);
+    for (std::size_t j = 4 * k; j < std::min(4 * k + 4, count); ++j) {
+      for (std::size_t v = 0; v < vertices; ++v)
+        numbers[v * count + j] =
+            static_cast<float>(form.offset[j] + form.scale[j] * static_cast<double>(stored[4 * v + j - 4 * k]));
+    }
   }
+  out.coefficients.resize((first + vertices) * out.stride());
+  for (std::size_t v = 0; v < vertices; ++v)
+    slots_of(form, out, &numbers[v * count], &out.coefficients[(first + v) * out.stride()]);
 }
 
 void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& findings) {
@@ -252,18 +263,35 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   return out;
 }
 
+/// Fills the rows that the header names.
+void read_components(const gltf::BufferBytes& bytes, BakedHeader& header, Findings& findings) {
+  if (header.components_view < 0) return;
+  std::vector<float>& rows = header.form.components.rows;
+  const auto view = static_cast<std::size_t>(header.components_view);
+  const std::string place = "/extensions/KILN_radiance_transfer/components/bufferView";
+  if (view >= bytes.views.size() || bytes.views[view].size() != rows.size() * sizeof(float)) {
+    findings.fail("slot_count_mismatch", "The buffer view does not hold the mean and the components.", place);
+    return;
+  }
+  std::memcpy(rows.data(), bytes.views[view].data(), rows.size() * sizeof(float));
+  if (!std::ranges::all_of(rows, [](float x) { return std::isfinite(x); }))
+    findings.fail("number_out_of_range", "A component is not finite.", place);
+}
+
 BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   const GltfContainer container = open_glb(file, findings);
   if (findings.failed()) return {};
   scan_json(container.json, {}, findings);
   if (findings.failed()) return {};
-  const BakedHeader header = read_baked_header(container.json, findings);
+  BakedHeader header = read_baked_header(container.json, findings);
   if (findings.failed()) return {};
   const gltf::Document document = gltf::load_document(container.json, findings);
   if (!findings.failed()) gltf::check_document(document, findings);
   if (!findings.failed()) check_shape(document, header, findings);
   if (findings.failed()) return {};
   const gltf::BufferBytes bytes = gltf::load_bytes(document, container, {}, {}, findings);
+  if (findings.failed()) return {};
+  read_components(bytes, header, findings);
   if (findings.failed()) return {};
   return read_scene({document, bytes, header}, findings);
 }

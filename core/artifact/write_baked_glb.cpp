@@ -1,6 +1,7 @@
 // BakedScene -> scene.glb. core/artifact/README.md specifies what is written here.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -42,9 +43,10 @@ class Writer {
   Result<Bytes> write() {
     const auto vertices = used_vertices(baked_.scene.mesh);
     if (vertices.empty()) return fault("nothing_to_write", "The baked scene has no triangle.");
-    ranges_ = slot_ranges(baked_.transfer, vertices);
+    transfer_.emplace(baked_.transfer, encoding_.transfer, vertices);
     if (const auto done = add_parts(); !done) return tl::make_unexpected(done.error());
     add_images();
+    add_components();
     std::string text = document().dump(-1, ' ', false, json::error_handler_t::replace);
     return join_glb(std::move(text), std::move(binary_));
   }
@@ -69,7 +71,7 @@ class Writer {
   }
 
   Result<void> add_parts() {
-    return visit_part_primitives(baked_, {encoding_, &ranges_}, [this](PartPrimitive part) -> Result<void> {
+    return visit_part_primitives(baked_, {encoding_, &*transfer_}, [this](PartPrimitive part) -> Result<void> {
       const std::size_t triangles = part.mesh.triangles.size();
       KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
       KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), triangles, true}));
@@ -138,25 +140,37 @@ class Writer {
     }
   }
 
+  /// The mean and the components, float32, little endian.
+  void add_components() {
+    const std::vector<float>& rows = transfer_->form().components.rows;
+    if (rows.empty()) return;
+    static_assert(std::endian::native == std::endian::little);
+    components_ = add_view({reinterpret_cast<const std::uint8_t*>(rows.data()), rows.size() * sizeof(float)});
+  }
+
   json transfer_extension() const {
     const Transfer& t = baked_.transfer;
+    const StoredForm& form = transfer_->form();
     json attributes = json::array(), light = json::array();
-    for (std::size_t k = 0; k < slot_vec4s(t.stride()); ++k) attributes.push_back("_PRT_" + std::to_string(k));
+    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back("_PRT_" + std::to_string(k));
     for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
-    return {{"version", 1},
-            {"basis", "real-sh"},
-            {"condonShortley", false},
-            {"frame", "world, +Y up"},
-            {"order", t.order},
-            {"channels", t.channels},
-            {"fixed", t.fixed},
-            {"slots", t.slots()},
-            {"attributes", attributes},
-            {"scale", ranges_.scale},
-            {"offset", ranges_.offset},
-            {"light", {{"name", baked_.light.name}, {"coefficients", light}}},
-            {"look", {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}}},
-            {"units", "W m^-2 sr^-1"}};
+    json out = {{"version", 2},
+                {"basis", "real-sh"},
+                {"condonShortley", false},
+                {"frame", "world, +Y up"},
+                {"order", t.order},
+                {"channels", t.channels},
+                {"fixed", t.fixed},
+                {"slots", t.slots()},
+                {"form", form.raw() ? "raw" : "components"},
+                {"attributes", attributes},
+                {"scale", form.scale},
+                {"offset", form.offset},
+                {"light", {{"name", baked_.light.name}, {"coefficients", light}}},
+                {"look", {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}}},
+                {"units", "W m^-2 sr^-1"}};
+    if (components_) out["components"] = {{"rank", form.components.rank()}, {"bufferView", *components_}};
+    return out;
   }
 
   void put_scenes(json& out, const json& light_nodes) const {
@@ -214,7 +228,8 @@ class Writer {
 
   const BakedScene& baked_;
   const Encoding& encoding_;
-  SlotRanges ranges_;
+  std::optional<StoredTransfer> transfer_;
+  std::optional<std::size_t> components_;  // buffer view
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();
   json baked_primitives_ = json::array(), original_primitives_ = json::array();

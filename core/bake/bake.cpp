@@ -10,6 +10,7 @@
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
+#include "core/bake/compression.h"
 #include "core/bake/job_light.h"
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
@@ -92,6 +93,7 @@ struct Pass {
   Plan plan;
   Bytes glb;
   std::vector<StreamBytes> streams;
+  std::size_t rank = 0;  // of the stored components; 0: raw
   BakedScene decoded;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
@@ -104,7 +106,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   Transport transport = solve_transport(scene, plan, input.recipe.seed, log, threads);
   log.begin("write", 0.9);
   BakedScene baked = assemble(std::move(scene), std::move(transport.transfer), light, provenance(input));
-  const Encoding encoding{.coefficient_bits = plan.coefficient_bits};
+  const Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
+  const StorageProbes storage = probe_storage(baked, encoding.transfer, transport.noise.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   scene = std::move(baked.scene);
@@ -117,8 +120,9 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     pass.certificate =
         certify(decoded, truth, light,
                 {.bake_rays = log.rays(), .thorough = bool{input.recipe.promise}, .seed = input.recipe.seed}, threads);
-    pass.sources = split_error(*pass.certificate, decoded, transport.noise, plan);
+    pass.sources = split_error(*pass.certificate, decoded, transport.noise, storage, plan.tail_left);
   }
+  pass.rank = encoding.transfer.components.rank();
   pass.plan = std::move(plan);
   pass.glb = std::move(glb);
   pass.streams = std::move(streams);
@@ -211,6 +215,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .result = pass.decoded.scene.mesh,
                                           .result_bytes = pass.glb.size(),
                                           .streams = pass.streams,
+                                          .rank = pass.rank,
                                           .certificate = pass.certificate,
                                           .sources = pass.sources,
                                           .passes = passes});

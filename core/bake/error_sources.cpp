@@ -53,50 +53,33 @@ class Judged {
   const Certificate& certificate_;
 };
 
-/// The variance of one draw is half that of the difference of two.
-double noise_squared(const Judged& judged, const NoiseProbes& noise, std::size_t slots) {
-  if (noise.vertices.empty()) return 0;
-  return kInterpolated * judged.mean([&](const std::vector<double>& weight, std::size_t c) {
+/// Mean squared light of the differences.
+double squared(const Judged& judged, const Probes& probes, std::size_t slots) {
+  if (probes.vertices.empty()) return 0;
+  return judged.mean([&](const std::vector<double>& weight, std::size_t c) {
     double sum = 0;
-    for (std::size_t p = 0; p < noise.vertices.size(); ++p) {
-      const float* d = noise.difference.data() + (3 * p + c) * slots;
+    for (std::size_t p = 0; p < probes.vertices.size(); ++p) {
+      const float* d = probes.difference.data() + (3 * p + c) * slots;
       double value = 0;
       for (std::size_t i = 0; i < slots; ++i) value += weight[i] * d[i];
-      sum += square(value) / 2;
+      sum += square(value);
     }
-    return sum / static_cast<double>(noise.vertices.size());
-  });
-}
-
-double quantisation_squared(const Judged& judged, const Transfer& transfer, int bits) {
-  const auto slots = static_cast<std::size_t>(transfer.slots());
-  std::vector<double> variance(static_cast<std::size_t>(transfer.channels) * slots, 0.0);
-  for (std::size_t s = 0; s < variance.size(); ++s) {
-    float low = 0, high = 0;
-    for (std::size_t v = 0; v < transfer.vertices(); ++v) {
-      const float x = transfer.coefficients[v * transfer.stride() + s];
-      low = v == 0 ? x : std::min(low, x);
-      high = v == 0 ? x : std::max(high, x);
-    }
-    variance[s] = square(std::ldexp(double{high} - low, -bits)) / 12;
-  }
-  return kInterpolated * judged.mean([&](const std::vector<double>& weight, std::size_t c) {
-    double sum = 0;
-    for (std::size_t i = 0; i < slots; ++i)
-      sum += square(weight[i]) * variance[(transfer.channels == 1 ? 0 : c) * slots + i];
-    return sum;
+    return sum / static_cast<double>(probes.vertices.size());
   });
 }
 
 }  // namespace
 
-ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const NoiseProbes& noise,
-                         const Plan& plan) {
+ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const Probes& noise,
+                         const StorageProbes& storage, double tail_left) {
   const Judged judged(certificate, decoded);
-  const double rays = noise_squared(judged, noise, static_cast<std::size_t>(decoded.transfer.slots()));
-  const double steps = quantisation_squared(judged, decoded.transfer, plan.coefficient_bits);
-  ErrorSources out{.noise = root(rays), .bounce_tail = plan.tail_left, .quantisation = root(steps)};
-  out.interpolation = root(square(certificate.transport.relrmse) - rays - steps - square(plan.tail_left));
+  const auto slots = static_cast<std::size_t>(decoded.transfer.slots());
+  const double rays = kInterpolated * squared(judged, noise, slots) / 2;  // of one draw: half the difference's
+  const double steps = kInterpolated * squared(judged, storage.rounding, slots);
+  const double rest = squared(judged, storage.left_out, slots);  // alike at a triangle's corners
+  ErrorSources out{
+      .noise = root(rays), .bounce_tail = tail_left, .quantisation = root(steps), .compression = root(rest)};
+  out.interpolation = root(square(certificate.transport.relrmse) - rays - steps - rest - square(tail_left));
   if (certificate.job_light && !certificate.transport.by_lighting.empty()) {
     const auto own = std::ranges::find(certificate.lightings, decoded.light.name);
     const bool known = own != certificate.lightings.end() && !decoded.light.coefficients.empty();

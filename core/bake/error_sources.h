@@ -3,25 +3,28 @@
 //
 //   noise          of the rays, from two independent draws at a few hundred vertices; interpolation halves its variance
 //   bounce_tail    share of the light in reflections beyond the last, from the plan's sample paths
-//   quantisation   of the stored numbers: uniform over a step
+//   quantisation   rounding of the stored numbers, compression   components that are not stored: what a reader finds at
+//                  the same vertices
 //   interpolation  what of the measured error the others leave: light that changes within triangles
 //   truncation     what the order cannot hold of the job's own light; beside the transport error, not part of it
-// The first four are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
+// The first five are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
 
 #include <optional>
 
 #include "core/artifact/baked_scene.h"
 #include "core/bake/certificate.h"
+#include "core/bake/compression.h"
 #include "core/bake/plan.h"
 #include "core/bake/transport.h"
 
 namespace kiln {
 
 struct ErrorSources {
-  double noise = 0, bounce_tail = 0, quantisation = 0, interpolation = 0;
+  double noise = 0, bounce_tail = 0, quantisation = 0, compression = 0, interpolation = 0;
   std::optional<double> truncation;
 };
 
-ErrorSources split_error(const Certificate&, const BakedScene& decoded, const NoiseProbes&, const Plan&);
+ErrorSources split_error(const Certificate&, const BakedScene& decoded, const Probes& noise, const StorageProbes&,
+                         double tail_left);
 
 }  // namespace kiln

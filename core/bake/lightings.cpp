@@ -47,4 +47,25 @@ Lightings test_lightings(const BakedScene& baked) {
   return out;
 }
 
+std::vector<double> band_power(const BakedScene& baked) {
+  const int order = baked.transfer.order;
+  std::vector<double> out(static_cast<std::size_t>(order), 4 * M_PI);  // the sun: 4 pi Y(w), of mean square 4 pi
+  double count = 1;
+  for (const auto& sh : test_lightings(baked).sh) {
+    double mean = 0;
+    for (std::size_t c = 0; c < 3; ++c) mean += sh[0][c] / 3 / (2 * std::sqrt(M_PI));
+    if (!(mean > 0)) continue;
+    for (int l = 0; l < order; ++l) {
+      double power = 0;
+      for (int i = l * l; i < (l + 1) * (l + 1); ++i) {
+        for (std::size_t c = 0; c < 3; ++c) power += std::pow(sh[static_cast<std::size_t>(i)][c] / mean, 2) / 3;
+      }
+      out[static_cast<std::size_t>(l)] += power / (2 * l + 1);
+    }
+    count += 1;
+  }
+  for (double& power : out) power /= count;
+  return out;
+}
+
 }  // namespace kiln

@@ -18,4 +18,9 @@ struct Lightings {
 /// Of the artefact's own order. A lobe is max(0, w . axis)^4: positive light that no two axes share much of.
 Lightings test_lightings(const BakedScene&);
 
+/// Power of the lightings in each band: the mean squared coefficient of light scaled to a mean of 1 over all
+/// directions, had they no preferred direction. Besides the test lightings and the job's own a sun counts, whose bands
+/// are all alike.
+std::vector<double> band_power(const BakedScene&);
+
 }  // namespace kiln

@@ -60,8 +60,19 @@ void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {
   plan.samples = step.samples.value_or(effort.samples);
   plan.bounce_samples = step.samples ? std::max(16, *step.samples / 4) : effort.bounce_samples;
   plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : effort.lamp_samples;
-  plan.coefficient_bits = step.coefficient_bits.value_or(effort.bits);
   decide(plan, "samples", std::to_string(plan.samples), step.samples ? kAsked : effort.reason);
+}
+
+void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
+  using Form = PrtStep::Encoding::Form;
+  plan.encoding = step.encoding;
+  plan.raw_bits = effort.bits;
+  plan.compression = effort.compression;
+  if (step.encoding.form != Form::automatic)
+    return decide(plan, "encoding", step.encoding.form == Form::raw ? "raw" : "pca", kAsked);
+  decide(plan, "encoding", "auto",
+         "components if they are smaller than raw coefficients; they may add " + text(100 * plan.compression) +
+             " % of error");
 }
 
 void plan_lamps(Plan& plan, const Scene& scene) {
@@ -95,13 +106,13 @@ void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision
 Effort effort_of(Quality quality) {
   switch (quality) {
     case Quality::draft:
-      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10};
+      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10, 0.01};
     case Quality::standard:
-      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12};
+      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12, 0.005};
     case Quality::finest:
       break;
   }
-  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14};
+  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14, 0.002};
 }
 
 // The noise of stratified rays falls nearly as one over their number: about .1 at 16 on the bunny, .015 at 256.
@@ -113,6 +124,7 @@ Effort first_effort(const Promise& promise) {
   effort.tail = std::clamp(target / 10, 5e-4, 0.02);
   effort.triangles = static_cast<std::uint64_t>(std::clamp(100 / target, 500.0, 10'000.0));
   effort.bits = target >= 0.05 ? 10 : target >= 0.01 ? 12 : 14;
+  effort.compression = std::clamp(target / 10, 2e-4, 0.01);
   return effort;
 }
 
@@ -130,7 +142,7 @@ Prediction predict(const Plan& plan, const Scene& scene, int threads) {
       rays_per_vertex(Interreflection{.bounces = plan.bounces, .samples = plan.bounce_samples});
   out.rays = out.vertices * per_vertex;
   out.seconds = static_cast<double>(out.rays) / (kRaysPerSecond * std::max(1, threads)) + 0.2;
-  out.artifact_bytes = out.vertices * (slots * 3 * static_cast<std::uint64_t>(plan.coefficient_bits) / 16 + 8);
+  out.artifact_bytes = out.vertices * (slots * 3 * static_cast<std::uint64_t>(plan.raw_bits) / 16 + 8);
   return out;
 }
 
@@ -141,6 +153,7 @@ Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Th
   plan_bounces(plan, scene, step, effort, threads);
   plan_samples(plan, step, effort);
   plan_subdivision(plan, scene, step.subdivide, effort);
+  plan_encoding(plan, step, effort);
   decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
   plan.prediction = predict(plan, scene, threads.count());
   return plan;

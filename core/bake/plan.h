@@ -38,7 +38,9 @@ struct Plan {
   bool lamps = false;        // the scene has light of its own
   bool split = false;        // subdivide at all
   Subdivide subdivide;
-  int coefficient_bits = 12;
+  PrtStep::Encoding encoding;
+  int raw_bits = 12;           // of coefficients, where the encoding leaves them open
+  double compression = 0.005;  // relRMSE that components may add
   std::vector<Decision> decisions;
   Prediction prediction;
 };
@@ -51,6 +53,7 @@ struct Effort {
   std::uint64_t triangles = 0;  // added where light changes
   float threshold = 0;          // of the residual measure; see subdivide.h
   int bits = 12;
+  double compression = 0.005;  // relRMSE: a tenth of the error that the quality is for
 };
 
 Effort effort_of(Quality);

@@ -95,11 +95,19 @@ PrtStep::Subdivision read_subdivision(const json& value, const std::string& poin
   return out;
 }
 
-void read_encoding(const json& value, const std::string& pointer, PrtStep& step, Errors& errors) {
+PrtStep::Encoding read_encoding(const json& value, const std::string& pointer, Errors& errors) {
+  using Form = PrtStep::Encoding::Form;
+  PrtStep::Encoding out;
   JsonFields fields(value, pointer, errors);
-  fields.word("form", {"auto", "raw"});
-  if (const auto bits = fields.integer_or_auto("bits", 4, 20)) step.coefficient_bits = static_cast<int>(*bits);
+  constexpr Form kForms[] = {Form::automatic, Form::raw, Form::components};
+  if (const auto form = fields.word("form", {"auto", "raw", "pca"})) out.form = kForms[*form];
+  if (const auto rank = fields.integer_or_auto("rank", 1, 3 * kMaxShOrder * kMaxShOrder)) {
+    out.rank = static_cast<int>(*rank);
+    if (out.form == Form::raw) fields.error("rank", "means nothing where the form is raw", "form: pca");
+  }
+  if (const auto bits = fields.integer_or_auto("bits", 4, 20)) out.bits = static_cast<int>(*bits);
   fields.finish();
+  return out;
 }
 
 PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors) {
@@ -115,7 +123,7 @@ PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors)
   fields.word("glossy", {"auto", "off"});
   if (const json* value = fields.find("subdivide"))
     step.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
-  if (const json* value = fields.find("encoding")) read_encoding(*value, pointer + "/encoding", step, errors);
+  if (const json* value = fields.find("encoding")) step.encoding = read_encoding(*value, pointer + "/encoding", errors);
   return step;
 }
 
@@ -252,13 +260,18 @@ json subdivision_json(const PrtStep::Subdivision& s) {
   return out;
 }
 
+json encoding_json(const PrtStep::Encoding& e) {
+  constexpr const char* kForms[] = {"auto", "raw", "pca"};
+  return {{"form", kForms[static_cast<int>(e.form)]}, {"rank", or_auto(e.rank)}, {"bits", or_auto(e.bits)}};
+}
+
 json step_json(const PrtStep& step) {
   return {{"do", "prt"},
           {"order", or_auto(step.order)},
           {"bounces", or_auto(step.bounces)},
           {"samples", or_auto(step.samples)},
           {"subdivide", subdivision_json(step.subdivide)},
-          {"encoding", {{"form", "auto"}, {"bits", or_auto(step.coefficient_bits)}}}};
+          {"encoding", encoding_json(step.encoding)}};
 }
 
 }  // namespace

@@ -41,7 +41,12 @@ struct PrtStep {
     int max_depth = 8;
   };
   Subdivision subdivide;
-  std::optional<int> coefficient_bits;
+  struct Encoding {
+    enum class Form { automatic, raw, components } form = Form::automatic;  // "auto", "raw", "pca"
+    std::optional<int> rank;                                                // numbers of components
+    std::optional<int> bits;                                                // of each stored number
+  };
+  Encoding encoding;
 };
 
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"

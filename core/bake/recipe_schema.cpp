@@ -54,9 +54,11 @@ std::string recipe_schema() {
           },
           "encoding": {
             "type": "object", "additionalProperties": false,
+            "not": {"required": ["form", "rank"], "properties": {"form": {"const": "raw"}, "rank": {"type": "integer"}}},
             "properties": {
-              "form": {"enum": ["auto", "raw"], "default": "auto"},
-              "bits": {"anyOf": [{"type": "integer", "minimum": 4, "maximum": 20}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+              "form": {"description": "raw: every coefficient; pca: weights of principal components; auto: what is smaller", "enum": ["auto", "raw", "pca"], "default": "auto"},
+              "rank": {"description": "components; auto: as few as a tenth of the error target allows", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 300}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+              "bits": {"description": "of each stored number", "anyOf": [{"type": "integer", "minimum": 4, "maximum": 20}, {"$ref": "#/definitions/auto"}], "default": "auto"}
             }
           }
         }

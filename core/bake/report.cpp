@@ -46,6 +46,8 @@ ordered_json result_object(const ReportInput& in) {
           {"vertices", in.result.position.size()},
           {"bytes", in.result_bytes},
           {"bytes_per_vertex", static_cast<double>(in.result_bytes) / static_cast<double>(vertices)},
+          {"form", in.rank > 0 ? "pca" : "raw"},
+          {"rank", in.rank},
           {"streams", streams}};
 }
 
@@ -90,14 +92,15 @@ ordered_json parameters_object(const Plan& plan) {
           {"measure", kMeasures[static_cast<int>(plan.subdivide.measure)]},
           {"threshold", plan.subdivide.threshold},
           {"max_depth", plan.subdivide.max_depth},
-          {"coefficient_bits", plan.coefficient_bits}};
+          {"compression", plan.compression}};
 }
 
 ordered_json sources_object(const ErrorSources& s) {
   ordered_json out = {{"noise", s.noise},
                       {"interpolation", s.interpolation},
                       {"bounce_tail", s.bounce_tail},
-                      {"quantisation", s.quantisation}};
+                      {"quantisation", s.quantisation},
+                      {"compression", s.compression}};
   if (s.truncation) out["truncation"] = *s.truncation;
   return out;
 }

@@ -22,6 +22,7 @@ struct ReportInput {
   const Mesh& result;  // as delivered
   std::uint64_t result_bytes = 0;
   const std::vector<StreamBytes>& streams;
+  std::size_t rank = 0;  // of the stored components; 0: raw
   const std::optional<Certificate>& certificate;
   const std::optional<ErrorSources>& sources;
   const Passes& passes;  // none where a quality was asked for

@@ -12,15 +12,15 @@
 
 namespace kiln {
 
-/// What two independent draws of the same samples tell at some vertices, spread evenly over the surface.
-struct NoiseProbes {
+/// Differences of transfer vectors at some vertices, spread evenly over the surface.
+struct Probes {
   std::vector<std::uint32_t> vertices;
-  std::vector<float> difference;  // [probe * 3 * slots + c * slots + i]: second draw minus first, always RGB
+  std::vector<float> difference;  // [probe * 3 * slots + c * slots + i], always RGB
 };
 
 struct Transport {
   Transfer transfer;  // of scene.mesh's vertices
-  NoiseProbes noise;
+  Probes noise;       // a second, independent draw of the same samples minus the first
 };
 
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is

@@ -1,7 +1,9 @@
 // How fast the viewer is in headless Chromium. Prints one JSON line per case; asserts nothing.
+//   node bench.mjs [SCENE.glb]   a baked scene; without one a made-up field of 50 000 vertices with raw coefficients
 //   first_picture_ms   from the request of /view/{id} to the first lit picture drawn
 //   relight_ms         in the worker, for a new light (median); frame_ms: one orbit step, drawn and read back (median)
 
+import { readFileSync } from 'node:fs';
 import { loadavg } from 'node:os';
 import { openPage, ready, startBrowser, until, whatIsMissing } from './browser.mjs';
 import { makeLarge } from './make_large.mjs';
@@ -48,7 +50,7 @@ if (missing) {
   console.log(JSON.stringify({ bench: 'viewer', skipped: missing }));
   process.exit(0);
 }
-const scene = await makeLarge(224, 6);
+const scene = process.argv[2] ? readFileSync(process.argv[2]) : await makeLarge(224, 6);
 const [browser, mock] = [await startBrowser(), await startMock({ files: { 'scene.glb': scene } })];
 const pictures = [];
 for (let run = 0; run < kRuns; ++run) {
@@ -64,8 +66,7 @@ for (let run = 0; run < kRuns; ++run) {
       bench: 'viewer',
       vertices: await page.evaluate(() => window.kilnViewer.model.vertices),
       triangles: await page.evaluate(() => window.kilnViewer.model.triangles),
-      order: 6,
-      channels: 3,
+      numbers: await page.evaluate(() => window.kilnViewer.model.transfer.scale.length), // of a vertex
       bytes: scene.length,
       first_picture_ms: round(median(pictures)),
       first_picture_best_ms: round(Math.min(...pictures)),

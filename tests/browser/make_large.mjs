@@ -131,13 +131,14 @@ export async function makeLarge(side = 224, order = 6) {
     buffers: [{ byteLength: bytes.length + (-bytes.length & 3) }],
     extensions: {
       KILN_radiance_transfer: {
-        version: 1,
+        version: 2,
         basis: 'real-sh',
         condonShortley: false,
         order,
         channels: 3,
         fixed: false,
         slots: order * order,
+        form: 'raw',
         attributes: packed.map((_, k) => `_PRT_${k}`),
         scale,
         offset,

@@ -38,10 +38,9 @@ function decodePrimitive(draco, json, binary, primitive, extension) {
   const stored = extension.attributes.map(read);
   const slots = extension.channels * extension.slots;
   const vertices = mesh.num_points();
-  const transfer = Float64Array.from({ length: vertices * slots }, (_, i) => {
-    const slot = i % slots;
-    return extension.offset[slot] + extension.scale[slot] * stored[slot >> 2][4 * Math.floor(i / slots) + (slot & 3)];
-  });
+  const numberAt = (v, j) => extension.offset[j] + extension.scale[j] * stored[j >> 2][4 * v + (j & 3)];
+  const slotAt = extension.form === 'raw' ? numberAt : slotOfComponents(json, binary, extension, numberAt);
+  const transfer = Float64Array.from({ length: vertices * slots }, (_, i) => slotAt(Math.floor(i / slots), i % slots));
   const own = primitive.extensions.KILN_radiance_transfer;
   const colours = attributes._ALBEDO === undefined ? null : read('_ALBEDO'); // RGBA, replaces the factor
   const albedoAt = (v) => (colours ? [...colours.subarray(4 * v, 4 * v + 3)] : own.albedo);
@@ -53,6 +52,20 @@ function decodePrimitive(draco, json, binary, primitive, extension) {
     normal: read('NORMAL'),
     albedoAt,
     emission: own.emission,
+  };
+}
+
+/// Slot `s` of vertex `v`: the mean and the weighted rows, or the lamps' light that stands behind the weights.
+function slotOfComponents(json, binary, extension, numberAt) {
+  const { rank, bufferView } = extension.components;
+  const flat = extension.channels * extension.slots;
+  const row = (k, s) => binary.readFloatLE((json.bufferViews[bufferView].byteOffset ?? 0) + 4 * (k * flat + s));
+  return (v, s) => {
+    if (extension.fixed && s % extension.slots === extension.slots - 1)
+      return numberAt(v, rank + Math.floor(s / extension.slots));
+    let sum = row(0, s);
+    for (let k = 0; k < rank; ++k) sum += numberAt(v, k) * row(k + 1, s);
+    return sum;
   };
 }
 

@@ -9,9 +9,7 @@ import { startBrowser, until } from './browser.mjs';
 import { decodeBaked, valueAt } from './read_glb.mjs';
 import { bundle, pathInViewer } from './sources.mjs';
 
-const file = readFileSync(new URL('fixtures/scene.glb', import.meta.url));
-
-async function serve() {
+async function serve(file) {
   const script = await bundle(fileURLToPath(new URL('stock_page/main.ts', import.meta.url)));
   const server = createServer((request, response) => {
     const name = request.url.split('/').pop();
@@ -29,8 +27,9 @@ async function serve() {
   return server;
 }
 
-test('a stock GLTFLoader reads both scenes, and our reader gives the light that the file defines', async () => {
-  const [browser, server] = [await startBrowser(), await serve()];
+async function check(name) {
+  const file = readFileSync(new URL(`fixtures/${name}`, import.meta.url));
+  const [browser, server] = [await startBrowser(), await serve(file)];
   try {
     const page = await browser.newPage();
     await page.goto(`http://127.0.0.1:${server.address().port}/`);
@@ -56,4 +55,7 @@ test('a stock GLTFLoader reads both scenes, and our reader gives the light that 
     server.closeAllConnections();
     server.close();
   }
-});
+}
+
+for (const name of ['scene.glb', 'components.glb'])
+  test(`${name}: a stock GLTFLoader reads both scenes, and our reader gives the light that the file defines`, () => check(name));

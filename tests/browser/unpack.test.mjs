@@ -3,11 +3,12 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { decodeBaked, glbJson } from './read_glb.mjs';
+import { decodeBaked, glbJson, valueAt } from './read_glb.mjs';
 import { fromViewer, load } from './sources.mjs';
 
 const { splitGlb, joinGlb } = await load('asset/glb.ts');
 const { unpack } = await load('asset/unpack.ts');
+const { coefficientsOf, relight } = await load('light/transfer.ts');
 const draco = await fromViewer('draco3dgltf').createDecoderModule({});
 
 const file = readFileSync(new URL('fixtures/scene.glb', import.meta.url));
@@ -89,14 +90,37 @@ test('images are the same bytes', () => {
 
 test('the transfer vectors are apart, those of the file, and nowhere in the plain file', () => {
   assert.equal(unpacked.baked.length, baked.parts.length);
-  unpacked.baked.forEach(({ coefficients, positions, indices }, i) => {
+  unpacked.baked.forEach(({ numbers, positions, indices }, i) => {
     const part = baked.parts[i];
-    assert.deepEqual(coefficients, Float32Array.from(part.transfer)); // doubles rounded once
+    assert.deepEqual(coefficientsOf(unpacked.form, numbers), Float32Array.from(part.transfer)); // doubles rounded once
     assert.deepEqual(positions, part.position);
     assert.deepEqual(indices, numbersOf(plain.json.meshes[0].primitives[i].indices));
   });
   for (const { attributes } of plain.json.meshes[0].primitives)
     assert.ok(!Object.keys(attributes).some((name) => name.startsWith('_PRT') || name === 'COLOR_0'));
+});
+
+test('components give the light that the file defines, lamps and all, and the coefficients behind it', async () => {
+  const bytes = readFileSync(new URL('fixtures/components.glb', import.meta.url));
+  const { extension, parts } = await decodeBaked(bytes);
+  const { form, baked: read, file: written } = unpack(draco, bufferOf(bytes));
+  assert.equal(form.components.rank, extension.components.rank);
+  const light = Float32Array.from({ length: 3 * extension.order ** 2 }, (_, i) => Math.sin(i)); // of size 1, any signs
+  const kSums = 2e-5; // float32 numbers, rows and sums of 20 terms below 4, against double
+  read.forEach(({ numbers }, i) => {
+    for (const lamps of [true, false]) {
+      const values = relight(form, numbers, light, lamps);
+      for (let v = 0; v < parts[i].vertices; v += 5)
+        valueAt(extension, parts[i], v, light, lamps).forEach((value, c) =>
+          assert.ok(Math.abs(values[3 * v + c] - value) < kSums, `${values[3 * v + c]} is not ${value}`),
+        );
+    }
+    coefficientsOf(form, numbers).forEach((t, k) => assert.ok(Math.abs(t - parts[i].transfer[k]) < kSums));
+  });
+  const { json, binary } = glbJson(Buffer.from(written));
+  const { byteOffset = 0, byteLength } = json.bufferViews[json.extensions.KILN_radiance_transfer.components.bufferView];
+  const rows = new Float32Array(bufferOf(binary.subarray(byteOffset, byteOffset + byteLength)));
+  assert.deepEqual(rows, form.components.rows);
 });
 
 test('what the decoder lends it gets back: a hundred files need no more memory than a few', () => {
@@ -111,7 +135,7 @@ const kBroken = {
   'a text': [bufferOf(Buffer.from('{"asset": {"version": "2.0"}, "scenes": []}')), /no GLB/],
   'a file that is cut off': [bufferOf(file.subarray(0, file.length - 5000)), /cut off/],
   'a glTF of another kind': [altered((json) => void delete json.extensions), /no KILN_radiance_transfer/],
-  'a version to come': [altered((json) => void (json.extensions.KILN_radiance_transfer.version = 2)), /newer/],
+  'a version to come': [altered((json) => void (json.extensions.KILN_radiance_transfer.version = 3)), /knows/],
   'a view beyond the end': [altered((json) => void (json.bufferViews[0].byteLength = 1e9)), /beyond the end/],
   'a view that is not there': [
     altered((json) => void (json.meshes[0].primitives[0].extensions.KHR_draco_mesh_compression.bufferView = 99)),

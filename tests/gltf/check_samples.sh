@@ -7,6 +7,7 @@ dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
 "$1" "$dir/sphere.glb" 4 3
 "$1" "$dir/grey.glb" 6 1
+"$1" --components "$dir/components.glb" 6 3
 "$1" --everything "$dir/everything.glb" 3 3
 "$1" --everything "$dir/order10.glb" 10 3
 node "$here/validate.mjs" "$dir"/*.glb

@@ -8,7 +8,7 @@ import { lightValues, readRadianceTransfer } from '../../../web_viewer/src/asset
 async function run(): Promise<unknown> {
   const decoder = new DRACOLoader().setDecoderPath('/draco/');
   const gltf = await new GLTFLoader().setDRACOLoader(decoder).loadAsync('/scene.glb');
-  const baked = readRadianceTransfer(gltf);
+  const baked = await readRadianceTransfer(gltf);
   if (!baked) throw new Error('no KILN_radiance_transfer');
   const parts = baked.parts.map((part) => {
     const values = lightValues(baked, part.geometry, baked.bakedLight);

@@ -62,7 +62,7 @@ TEST(DamagedGlb, FilesThatKilnDidNotWriteAreNamedSo) {
 
 TEST(DamagedGlb, EachBrokenPromiseHasItsCode) {
   const Bytes file = sample_file();
-  EXPECT_EQ(code_of(with_json(file, "\"version\":1,", "\"version\":2,")), "unsupported_version");
+  EXPECT_EQ(code_of(with_json(file, "\"version\":2,", "\"version\":1,")), "unsupported_version");
   EXPECT_EQ(code_of(with_json(file, "\"order\":2", "\"order\":3")), "slot_count_mismatch");
   EXPECT_EQ(code_of(with_json(file, "\"order\":2", "\"order\":11")), "number_out_of_range");
   EXPECT_EQ(code_of(with_json(file, "\"channels\":3", "\"channels\":2")), "number_out_of_range");

@@ -1,6 +1,7 @@
-// kiln-make-sample OUT.glb [ORDER [CHANNELS]]             a sphere over a plane as a baked scene
+// kiln-make-sample OUT.glb [ORDER [CHANNELS]]               a sphere over a plane as a baked scene
+// kiln-make-sample --components OUT.glb [ORDER [CHANNELS]]  the same, stored as weights of 16 components
 // kiln-make-sample --everything OUT.glb [ORDER [CHANNELS]]  all that the format can carry
-// kiln-make-sample --import SCENE.gltf OUT.glb            a scene as if under an open sky, without a bake
+// kiln-make-sample --import SCENE.gltf OUT.glb              a scene as if under an open sky, without a bake
 
 #include <cstdio>
 #include <fstream>
@@ -15,8 +16,8 @@ int number_or(std::span<char*> arguments, std::size_t at, int absent) {
   return at < arguments.size() ? std::stoi(arguments[at]) : absent;
 }
 
-int write_sample(const char* path, const kiln::BakedScene& scene) {
-  const auto file = kiln::write_baked_glb(scene);
+int write_sample(const char* path, const kiln::BakedScene& scene, const kiln::Encoding& encoding = {}) {
+  const auto file = kiln::write_baked_glb(scene, encoding);
   if (!file) {
     std::fprintf(stderr, "%s\n", file.error().message.c_str());
     return 65;
@@ -42,11 +43,17 @@ int main(int argc, char** argv) {
   const std::string mode = !arguments.empty() && arguments[0][0] == '-' ? arguments[0] : "";
   if (!mode.empty()) arguments = arguments.subspan(1);
   if (arguments.size() < (mode == "--import" ? 2u : 1u)) {
-    std::fputs("usage: kiln-make-sample [--everything | --import SCENE.gltf] OUT.glb [ORDER [CHANNELS]]\n", stderr);
+    std::fputs(
+        "usage: kiln-make-sample [--components | --everything | --import SCENE.gltf] OUT.glb [ORDER [CHANNELS]]\n",
+        stderr);
     return 64;
   }
   if (mode == "--import") return import_sample(arguments[0], arguments[1]);
   const int order = number_or(arguments, 1, 4), channels = number_or(arguments, 2, 3);
+  if (mode == "--components") {
+    const kiln::BakedScene scene = kiln::sphere_over_plane(order, channels, true);
+    return write_sample(arguments[0], scene, {.transfer = kiln::as_components(scene, 16)});
+  }
   return write_sample(arguments[0], mode == "--everything" ? kiln::everything(order, channels)
                                                            : kiln::sphere_over_plane(order, channels, true));
 }

@@ -26,13 +26,14 @@ double half_step(double range, int bits) {
 }
 
 /// The bound of one slot: half a step, and the rounding of offset + scale * stored to float (2^-149 if denormal).
-double slot_bound(const SlotRanges& ranges, std::size_t s, int bits) {
+double slot_bound(const StoredForm& ranges, std::size_t s, int bits) {
   return half_step(2 * ranges.scale[s], bits) + (std::abs(ranges.offset[s]) + ranges.scale[s]) * 0x1p-23 + 0x1p-149;
 }
 
 /// The largest error of any slot in units of its bound.
 double worst_slot_error(const BakedScene& written, const BakedScene& read, int bits) {
-  const SlotRanges ranges = slot_ranges(written.transfer, used_vertices(written.scene.mesh));
+  const StoredTransfer stored(written.transfer, {.bits = bits}, used_vertices(written.scene.mesh));
+  const StoredForm& ranges = stored.form();
   const auto original = original_vertices(read);
   double worst = 0;
   for (std::size_t v = 0; v < original.size(); ++v) {
@@ -96,7 +97,7 @@ TEST(BakedScene, AConstantSlotIsExact) {
 TEST(BakedScene, MoreBitsMeanLessError) {
   const BakedScene written = random_baked({.order = 2});
   for (const int bits : {11, 14, 16, 20}) {
-    EXPECT_LE(worst_slot_error(written, round_trip(written, {.coefficient_bits = bits}), bits), 1) << bits;
+    EXPECT_LE(worst_slot_error(written, round_trip(written, {.transfer = {.bits = bits}}), bits), 1) << bits;
   }
 }
 

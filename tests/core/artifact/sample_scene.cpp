@@ -175,4 +175,10 @@ BakedScene single_triangle(int order, int channels, bool fixed) {
   return out;
 }
 
+TransferEncoding as_components(const BakedScene& baked, std::size_t rank) {
+  const std::vector<double> sun(static_cast<std::size_t>(baked.transfer.order), 4 * M_PI);
+  const ComponentAnalysis analysis = analyse_components(baked.transfer, baked.scene.mesh, sun);
+  return {.components = analysis.first(rank), .weights = analysis.weights(baked.transfer, rank)};
+}
+
 }  // namespace kiln

@@ -16,6 +16,9 @@ BakedScene everything(int order, int channels);
 /// Any scene as if nothing stood in the way of the sky: grey clamped-cosine transfer under a soft sky.
 BakedScene open_sky(Scene, int order);
 
+/// The scene's transfer vectors as weights of so many components.
+TransferEncoding as_components(const BakedScene&, std::size_t rank);
+
 /// One triangle in the plane y = 0 with the given normal at its corners; order and channels as asked, all slots zero.
 BakedScene single_triangle(int order, int channels, bool fixed);
 

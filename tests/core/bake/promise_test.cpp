@@ -83,7 +83,7 @@ TEST(Promise, ErrorSourcesAreSquaresThatSumToTheCertificate) {
   const json report = report_of(*output);
   const json& sources = report["error_sources"];
   double sum = 0;
-  for (const char* name : {"noise", "interpolation", "bounce_tail", "quantisation"}) {
+  for (const char* name : {"noise", "interpolation", "bounce_tail", "quantisation", "compression"}) {
     const auto part = sources[name].get<double>();
     EXPECT_GE(part, 0) << name;
     sum += part * part;

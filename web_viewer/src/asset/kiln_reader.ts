@@ -5,7 +5,7 @@
 //   import { readRadianceTransfer, lightValues } from './kiln_reader';
 //
 //   const gltf = await new GLTFLoader().setDRACOLoader(new DRACOLoader()).loadAsync('scene.glb');
-//   const baked = readRadianceTransfer(gltf);                    // undefined: not one of ours
+//   const baked = await readRadianceTransfer(gltf);              // undefined: not one of ours
 //   const light = new Float32Array(3 * baked.order ** 2);        // SH radiance, light[3 * i + channel]; here:
 //   light.set([0, 1, 2].map(() => Math.sqrt(4 * Math.PI)));      // a constant sky of radiance 1
 //   for (const part of baked.parts) {
@@ -27,6 +27,8 @@ export interface RadianceTransferExtension {
   channels: 1 | 3;
   fixed: boolean;
   slots: number;
+  form: 'raw' | 'components';
+  components?: { rank: number; bufferView: number };
   attributes: string[];
   scale: number[];
   offset: number[];
@@ -46,12 +48,13 @@ export interface TransferPart {
 export interface RadianceTransfer extends RadianceTransferExtension {
   parts: TransferPart[];
   bakedLight: Float32Array; // light[3 * i + channel]; empty when the bake had no environment
+  rows: Float32Array; // of the components, after their mean: (rank + 1) x channels x slots; empty: raw
 }
 
 /// The part of GLTFLoader's result that is read here.
 export interface LoadedGltf {
   scene: Object3D;
-  parser: { json: unknown };
+  parser: { json: unknown; getDependency(type: 'bufferView', index: number): Promise<ArrayBuffer> };
 }
 
 const kName = 'KILN_radiance_transfer';
@@ -63,9 +66,12 @@ export function readExtension(json: unknown): RadianceTransferExtension | undefi
 }
 
 /// Reads the extension and finds its primitives in the default scene. Throws on a version or shape it does not know.
-export function readRadianceTransfer(gltf: LoadedGltf): RadianceTransfer | undefined {
+export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTransfer | undefined> {
   const extension = readExtension(gltf.parser.json);
   if (!extension) return undefined;
+  const rows = extension.components
+    ? componentRows(extension, await gltf.parser.getDependency('bufferView', extension.components.bufferView))
+    : new Float32Array(0);
   const parts: TransferPart[] = [];
   gltf.scene.traverse((object) => {
     const mesh = object as Mesh;
@@ -80,25 +86,35 @@ export function readRadianceTransfer(gltf: LoadedGltf): RadianceTransfer | undef
       material: own.material ?? -1,
     });
   });
-  return { ...extension, parts, bakedLight: Float32Array.from((extension.light?.coefficients ?? []).flat()) };
+  return { ...extension, parts, rows, bakedLight: Float32Array.from((extension.light?.coefficients ?? []).flat()) };
+}
+
+/// The mean and the rows of the components, from the bytes of their buffer view (little endian). Throws on another size.
+export function componentRows(e: RadianceTransferExtension, bytes: ArrayBuffer): Float32Array {
+  const count = ((e.components?.rank ?? 0) + 1) * e.channels * e.slots;
+  if (bytes.byteLength !== 4 * count) throw new Error(`${kName}: the buffer view does not hold its components`);
+  const view = new DataView(bytes);
+  return Float32Array.from({ length: count }, (_, i) => view.getFloat32(4 * i, true));
 }
 
 function checkShape(e: RadianceTransferExtension): void {
   const slots = e.order * e.order + (e.fixed ? 1 : 0);
-  const flat = e.channels * slots;
+  const rank = e.components?.rank ?? 0;
+  const numbers = e.form === 'raw' ? e.channels * slots : rank + (e.fixed ? e.channels : 0);
   const good =
+    (e.form === 'raw' || (e.form === 'components' && Number.isInteger(rank) && rank >= 1)) &&
     Number.isInteger(e.order) &&
     e.order >= 1 &&
     (e.channels === 1 || e.channels === 3) &&
     e.slots === slots &&
-    e.scale?.length >= flat &&
-    e.offset?.length >= flat &&
-    e.attributes?.length === Math.ceil(flat / 4);
-  if (e.version !== 1) throw new Error(`${kName} version ${e.version} is newer than this reader`);
+    e.scale?.length === numbers &&
+    e.offset?.length === numbers &&
+    e.attributes?.length === Math.ceil(numbers / 4);
+  if (e.version !== 2) throw new Error(`${kName} version ${e.version} is not the one this reader knows`);
   if (!good) throw new Error(`${kName} does not describe its own attributes`);
 }
 
-/// The `_PRT_k` arrays of a geometry, four flat slots each. GLTFLoader lower-cases attribute names.
+/// The `_PRT_k` arrays of a geometry, four numbers each. GLTFLoader lower-cases attribute names.
 export function transferAttributes(e: RadianceTransferExtension, geometry: BufferGeometry): Float32Array[] {
   return e.attributes.map((name) => {
     const attribute = geometry.getAttribute(name.toLowerCase()) as BufferAttribute | undefined;
@@ -111,7 +127,7 @@ export function transferAttributes(e: RadianceTransferExtension, geometry: Buffe
 /// `lamps`: add the light of the scene's own lamps where it was baked. 50 000 vertices of order 6 in RGB take about 30 ms;
 /// decode once and keep the numbers (as this viewer's worker does) if the light changes often.
 export function lightValues(
-  e: RadianceTransferExtension,
+  e: RadianceTransfer,
   geometry: BufferGeometry,
   light: ArrayLike<number>,
   lamps = true,
@@ -119,15 +135,39 @@ export function lightValues(
   const attributes = transferAttributes(e, geometry);
   const vertices = attributes[0].length / 4;
   const out = new Float32Array(3 * vertices);
-  const count = e.order * e.order;
-  for (let slot = 0; slot < e.channels * e.slots; ++slot) {
-    const [i, channel] = [slot % e.slots, Math.floor(slot / e.slots)];
-    for (const c of e.channels === 3 ? [channel] : [0, 1, 2]) {
-      const weight = i < count ? light[3 * i + c] : lamps ? 1 : 0;
-      const [factor, shift] = [e.scale[slot] * weight, e.offset[slot] * weight];
-      const stored = attributes[slot >> 2];
-      for (let v = 0; v < vertices; ++v) out[3 * v + c] += shift + factor * stored[4 * v + (slot & 3)];
-    }
-  }
+  const { mean, gains } = lightOfNumbers(e, light, lamps);
+  for (let v = 0; v < vertices; ++v) out.set(mean, 3 * v);
+  gains.forEach((rgb, j) => {
+    const stored = attributes[j >> 2];
+    rgb.forEach((gain, c) => {
+      const [factor, shift] = [e.scale[j] * gain, e.offset[j] * gain];
+      if (gain !== 0) for (let v = 0; v < vertices; ++v) out[3 * v + c] += shift + factor * stored[4 * v + (j & 3)];
+    });
+  });
   return out;
+}
+
+/// The RGB light that one of each stored number brings, and what is there without any.
+function lightOfNumbers(e: RadianceTransfer, light: ArrayLike<number>, lamps: boolean) {
+  const count = e.order * e.order;
+  const ofSlot = (slot: number, c: number): number => {
+    const [i, channel] = [slot % e.slots, Math.floor(slot / e.slots)];
+    if (e.channels === 3 && channel !== c) return 0;
+    return i < count ? light[3 * i + c] : lamps ? 1 : 0;
+  };
+  const flat = e.channels * e.slots;
+  const ofRow = (row: number) =>
+    [0, 1, 2].map((c) => {
+      let sum = 0;
+      for (let slot = 0; slot < flat; ++slot) sum += e.rows[row * flat + slot] * ofSlot(slot, c);
+      return sum;
+    });
+  const rank = e.components?.rank ?? 0;
+  const isRaw = e.form === 'raw';
+  const gains = e.scale.map((_, j) => {
+    if (!isRaw && j < rank) return ofRow(j + 1);
+    const slot = isRaw ? j : (j - rank + 1) * e.slots - 1; // after the components: the lamps of a channel
+    return [0, 1, 2].map((c) => ofSlot(slot, c));
+  });
+  return { mean: isRaw ? [0, 0, 0] : ofRow(0), gains };
 }

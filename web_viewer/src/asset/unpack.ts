@@ -3,21 +3,21 @@
 // KHR_draco_mesh_compression becomes ordinary accessors, in both scenes; these share their compressed bytes, and each mesh is
 // decoded once. The transfer vectors, and the COLOR_0 that stands for them in other viewers, stay out of the GLB.
 
-import { decodeAttribute } from '../light/transfer';
+import { decodeAttribute, numbersOf, type TransferForm } from '../light/transfer';
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
-import { readExtension, type RadianceTransferExtension } from './kiln_reader';
+import { componentRows, readExtension, type RadianceTransferExtension } from './kiln_reader';
 
 /// One baked primitive. Its vertices are in the order of the GLB's.
 export interface BakedPrimitive {
-  coefficients: Float32Array; // as light/transfer.ts has them
+  numbers: Float32Array; // as light/transfer.ts has them
   positions: Float32Array;
   indices: Uint32Array;
 }
 
 export interface Unpacked {
   file: ArrayBuffer;
-  extension: RadianceTransferExtension;
+  form: TransferForm;
   baked: BakedPrimitive[]; // in the order of the file
 }
 
@@ -66,16 +66,19 @@ export function unpack(draco: DracoModule, packed: ArrayBuffer): Unpacked {
   const extension = readExtension(parsed);
   if (!extension) throw new Error('this glTF carries no KILN_radiance_transfer');
   const json = parsed as Json;
+  const form = formOf(extension, json, binary);
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
   const out = new Binary();
   moveImages(json, binary, out);
+  if (extension.components)
+    extension.components.bufferView = out.add(bytesOf(json, binary, extension.components.bufferView));
   const accessors: Accessor[] = [];
   for (const [bytes, sharing] of byCompressedBytes(primitives, json, binary)) {
     const mesh = new DracoMesh(draco, bytes);
     try {
       for (const primitive of sharing) {
-        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension));
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, { extension, form }));
         makePlain(primitive, json, mesh, { accessors, out });
       }
     } finally {
@@ -89,7 +92,7 @@ export function unpack(draco: DracoModule, packed: ArrayBuffer): Unpacked {
   json.extensionsRequired = json.extensionsRequired?.filter((name) => name !== kDraco);
   return {
     file: joinGlb(json, out.pieces),
-    extension,
+    form,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
   };
 }
@@ -129,6 +132,13 @@ function entry<T>(list: T[] | undefined, index: number, what: string): T {
   return found;
 }
 
+function formOf(extension: RadianceTransferExtension, json: Json, binary: Uint8Array<ArrayBuffer>): TransferForm {
+  const { order, channels, fixed, slots, components } = extension;
+  if (!components) return { order, channels, fixed, slots };
+  const rows = componentRows(extension, bytesOf(json, binary, components.bufferView).slice().buffer);
+  return { order, channels, fixed, slots, components: { rank: components.rank, rows } };
+}
+
 function moveImages(json: Json, binary: Uint8Array<ArrayBuffer>, out: Binary): void {
   for (const image of json.images ?? [])
     if (image.bufferView !== undefined) image.bufferView = out.add(bytesOf(json, binary, image.bufferView));
@@ -154,18 +164,22 @@ function byCompressedBytes(
 }
 
 /// Takes the transfer vectors, and what stands for them, out of the primitive.
-function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTransferExtension): BakedPrimitive {
+function takeBaked(
+  primitive: Primitive,
+  mesh: DracoMesh,
+  { extension, form }: { extension: RadianceTransferExtension; form: TransferForm },
+): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
   const idOf = (name: string) => {
     if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
     return ids[name];
   };
-  const coefficients = new Float32Array(mesh.points * extension.channels * extension.slots);
+  const numbers = new Float32Array(mesh.points * numbersOf(form));
   extension.attributes.forEach((name, k) =>
-    mesh.lend(idOf(name), 4, (stored) => decodeAttribute(extension, k, stored, coefficients)),
+    mesh.lend(idOf(name), 4, (stored) => decodeAttribute(extension, k, stored, numbers)),
   );
   for (const name of [...extension.attributes, 'COLOR_0']) delete primitive.attributes[name];
-  return { coefficients, positions: mesh.floats(idOf('POSITION'), 3), indices: mesh.indices() };
+  return { numbers, positions: mesh.floats(idOf('POSITION'), 3), indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

@@ -1,7 +1,10 @@
 // Transfer vectors and what is computed from them. Pure functions: the worker calls them, tests call them.
 //
-//   coefficients[(v * channels + c) * slots + i]; slots = order^2, one more when `fixed` (light of the scene's own lamps)
 //   value_c(v) = sum_i light[3 i + c] * t[c][i] + (lamps ? t[c][order^2] : 0)                              (1)
+//   t[c][i] of vertex v is coefficients[(v * channels + c) * slots + i]; slots = order^2, one more when `fixed` (light of the
+//   scene's own lamps). A file holds `numbers` from which they follow: the coefficients themselves, or the weights of
+//   components and, of a scene with lamps, the lamps' light of each channel after them:
+//   coefficient[s] = mean[s] + sum_k number[k] row_k[s],  s = c * slots + i                               (2)
 
 export interface TransferShape {
   order: number;
@@ -10,15 +13,29 @@ export interface TransferShape {
   slots: number;
 }
 
-/// How `_PRT_k` attributes hold them: coefficient = offset + scale * stored, for each flat slot.
-export interface PackedTransfer extends TransferShape {
+/// Equation 2's: the mean and then the rows, (rank + 1) x channels x slots.
+export interface Components {
+  rank: number;
+  rows: Float32Array;
+}
+
+/// What the numbers of a vertex mean; without components they are its coefficients.
+export interface TransferForm extends TransferShape {
+  components?: Components;
+}
+
+/// How `_PRT_k` attributes hold the numbers: number = offset + scale * stored, for each.
+export interface PackedTransfer {
   scale: ArrayLike<number>;
   offset: ArrayLike<number>;
 }
 
-/// Decodes `_PRT_k` (4 flat slots for each vertex, in [-1, 1]) to its places in the coefficients `out`.
+export const numbersOf = ({ channels, slots, fixed, components }: TransferForm): number =>
+  components ? components.rank + (fixed ? channels : 0) : channels * slots;
+
+/// Decodes `_PRT_k` (4 numbers for each vertex, in [-1, 1]) to its places in `out`, `stride` numbers for each vertex.
 export function decodeAttribute(packed: PackedTransfer, k: number, stored: Float32Array, out: Float32Array): void {
-  const stride = packed.channels * packed.slots;
+  const stride = packed.scale.length;
   const first = 4 * k;
   const width = Math.min(4, stride - first); // the last attribute may be padded
   const factors = Float64Array.from({ length: width }, (_, i) => packed.scale[first + i]);
@@ -27,13 +44,71 @@ export function decodeAttribute(packed: PackedTransfer, k: number, stored: Float
     for (let i = 0; i < width; ++i) out[to + i] = shifts[i] + factors[i] * stored[from + i];
 }
 
-/// Equation (1) for every vertex, RGB. `out` may be given for reuse. Cost: vertices * channels' multiply-adds.
+/// Equation (1) for every vertex, RGB. `out` may be given for reuse. Cost: three multiply-adds for each slot or component.
 export function relight(
+  form: TransferForm,
+  numbers: Float32Array,
+  light: Float32Array,
+  lamps: boolean,
+  out: Float32Array = new Float32Array((3 * numbers.length) / numbersOf(form)),
+): Float32Array {
+  return form.components
+    ? relightComponents({ ...form, components: form.components }, numbers, light, lamps, out)
+    : relightRaw(form, numbers, light, lamps, out);
+}
+
+/// Equation (1) of the mean and of each row: what is then left for a vertex is a sum over its weights.
+function relightComponents(
+  form: Required<TransferForm>,
+  weights: Float32Array,
+  light: Float32Array,
+  lamps: boolean,
+  out: Float32Array,
+): Float32Array {
+  const { channels, fixed, components } = form;
+  const lit = relightRaw(form, components.rows, light, false, new Float32Array(3 * (components.rank + 1)));
+  const count = numbersOf(form);
+  const gains = new Float64Array(3 * count);
+  gains.set(lit.subarray(3));
+  if (fixed && lamps) for (let c = 0; c < 3; ++c) gains[3 * (components.rank + (channels === 1 ? 0 : c)) + c] = 1;
+  for (let v = 0, from = 0; v < out.length; v += 3, from += count) {
+    let [r, g, b] = lit;
+    for (let k = 0; k < count; ++k) {
+      const weight = weights[from + k];
+      r += weight * gains[3 * k];
+      g += weight * gains[3 * k + 1];
+      b += weight * gains[3 * k + 2];
+    }
+    out[v] = r;
+    out[v + 1] = g;
+    out[v + 2] = b;
+  }
+  return out;
+}
+
+/// Equation (2) for every vertex.
+export function coefficientsOf(form: TransferForm, numbers: Float32Array): Float32Array {
+  const { channels, slots, fixed, components } = form;
+  if (!components) return numbers;
+  const [stride, count] = [channels * slots, numbersOf(form)];
+  const out = new Float32Array((numbers.length / count) * stride);
+  for (let to = 0, from = 0; to < out.length; to += stride, from += count) {
+    for (let s = 0; s < stride; ++s) {
+      let sum = components.rows[s];
+      for (let k = 0; k < components.rank; ++k) sum += numbers[from + k] * components.rows[(k + 1) * stride + s];
+      out[to + s] = sum;
+    }
+    if (fixed) for (let c = 0; c < channels; ++c) out[to + (c + 1) * slots - 1] = numbers[from + components.rank + c];
+  }
+  return out;
+}
+
+function relightRaw(
   shape: TransferShape,
   coefficients: Float32Array,
   light: Float32Array,
   lamps: boolean,
-  out: Float32Array = new Float32Array((3 * coefficients.length) / (shape.channels * shape.slots)),
+  out: Float32Array,
 ): Float32Array {
   const count = shape.order * shape.order;
   const fixedWeight = shape.fixed && lamps ? 1 : 0;

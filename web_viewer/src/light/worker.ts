@@ -5,7 +5,14 @@ import { loadDraco } from '../asset/draco_module';
 import { unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
-import { pickCoefficient, quantile, relight, triangleMeasure, type TransferShape } from './transfer';
+import {
+  coefficientsOf,
+  pickCoefficient,
+  quantile,
+  relight,
+  triangleMeasure,
+  type TransferForm,
+} from './transfer';
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
@@ -14,8 +21,9 @@ const kNewsEvery = 100; // ms between two pieces of news of the download: each i
 const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
 
-let shape: TransferShape = { order: 0, channels: 1, fixed: false, slots: 0 };
+let form: TransferForm = { order: 0, channels: 1, fixed: false, slots: 0 };
 let parts: BakedPrimitive[] = [];
+let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
 async function open({ url }: OpenRequest, serial: number): Promise<void> {
   let next = 0;
@@ -24,15 +32,16 @@ async function open({ url }: OpenRequest, serial: number): Promise<void> {
     next = performance.now() + kNewsEvery;
     send({ serial, progress: { loaded, total } });
   });
-  const { file, extension, baked } = unpack(await decoder, packed);
-  [shape, parts] = [extension, baked];
+  const unpacked = unpack(await decoder, packed);
+  const { file } = unpacked;
+  [form, parts] = [unpacked.form, unpacked.baked];
   send({ serial, opened: { file, bytes: packed.byteLength } }, [file]);
 }
 
 /// Lamps count: they are there whatever the sky.
 function level(light: Float32Array): number {
   const brightest = parts.map((p) => {
-    const values = relight(shape, p.coefficients, light, true);
+    const values = relight(form, p.numbers, light, true);
     return Float32Array.from({ length: values.length / 3 }, (_, v) =>
       Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]),
     );
@@ -40,12 +49,14 @@ function level(light: Float32Array): number {
   return rangeOf(brightest, 0.9);
 }
 
+const allCoefficients = (): Float32Array[] => (coefficients ??= parts.map((p) => coefficientsOf(form, p.numbers)));
+
 function measure(weighted: boolean): Float32Array[] {
-  return parts.map((p) => triangleMeasure(shape, p.coefficients, p.positions, p.indices, weighted));
+  return allCoefficients().map((t, i) => triangleMeasure(form, t, parts[i].positions, parts[i].indices, weighted));
 }
 
 function coefficient(channel: number, slot: number): Float32Array[] {
-  return parts.map((p) => pickCoefficient(shape, p.coefficients, channel, slot));
+  return allCoefficients().map((t) => pickCoefficient(form, t, channel, slot));
 }
 
 async function project(request: ProjectRequest): Promise<ProjectReply> {
@@ -74,7 +85,7 @@ function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): Value
   switch (request.kind) {
     case 'relight':
       return timed(
-        () => parts.map((p, i) => relight(shape, p.coefficients, request.light, request.lamps, request.reuse[i])),
+        () => parts.map((p, i) => relight(form, p.numbers, request.light, request.lamps, request.reuse[i])),
         false,
       );
     case 'level':

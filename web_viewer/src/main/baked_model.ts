@@ -42,7 +42,7 @@ export class BakedModel {
   }
 
   static async create(asset: LoadedAsset): Promise<BakedModel> {
-    const transfer = readRadianceTransfer(asset.gltf);
+    const transfer = await readRadianceTransfer(asset.gltf);
     if (!transfer || transfer.parts.length === 0) throw new Error('this glTF carries no KILN_radiance_transfer');
     const model = new BakedModel(asset, transfer);
     for (const part of transfer.parts) model.parts.push(await model.dress(part, asset));

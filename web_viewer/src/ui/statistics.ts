@@ -45,6 +45,7 @@ const kSources: readonly (readonly [string, string])[] = [
   ['interpolation', 'from interpolation'],
   ['bounce_tail', 'from bounces left out'],
   ['quantisation', 'from quantisation'],
+  ['compression', 'from compression'],
   ['truncation', 'Own light cut by the order'],
 ];
 

@@ -1,0 +1,132 @@
+#include "core/artifact/stored_transfer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/expects.h"
+
+namespace kiln {
+namespace {
+
+constexpr int kFewestBits = 2, kMostBits = 20;
+
+std::size_t lamp_numbers(const Transfer& shape) { return shape.fixed ? static_cast<std::size_t>(shape.channels) : 0; }
+
+std::size_t lamp_slot(const Transfer& shape, std::size_t channel) {
+  return (channel + 1) * static_cast<std::size_t>(shape.slots()) - 1;
+}
+
+/// The weights and, behind them, the lamps' light of each vertex.
+std::vector<float> weights_and_lamps(const Transfer& transfer, const TransferEncoding& encoding) {
+  const std::size_t rank = encoding.components.rank(), lamps = lamp_numbers(transfer);
+  EXPECTS(encoding.weights.size() == rank * transfer.vertices());
+  if (lamps == 0) return encoding.weights;
+  std::vector<float> out((rank + lamps) * transfer.vertices());
+  for (std::size_t v = 0; v < transfer.vertices(); ++v) {
+    float* to = &out[v * (rank + lamps)];
+    std::copy_n(&encoding.weights[v * rank], rank, to);
+    for (std::size_t c = 0; c < lamps; ++c) to[rank + c] = transfer.at(v, 0)[lamp_slot(transfer, c)];
+  }
+  return out;
+}
+
+}  // namespace
+
+std::size_t StoredForm::expected_count(const Transfer& shape) const {
+  return raw() ? shape.stride() : components.rank() + lamp_numbers(shape);
+}
+
+void slots_of(const StoredForm& form, const Transfer& shape, const float* numbers, float* slots) {
+  const std::size_t stride = shape.stride();
+  if (form.raw()) {
+    std::copy_n(numbers, stride, slots);
+    return;
+  }
+  const std::size_t rank = form.components.rank();
+  for (std::size_t s = 0; s < stride; ++s) {
+    double sum = form.components.mean()[s];
+    for (std::size_t k = 0; k < rank; ++k) sum += static_cast<double>(numbers[k]) * form.components.row(k)[s];
+    slots[s] = static_cast<float>(sum);
+  }
+  for (std::size_t c = 0; c < lamp_numbers(shape); ++c) slots[lamp_slot(shape, c)] = numbers[rank + c];
+}
+
+StoredTransfer::StoredTransfer(const Transfer& transfer, const TransferEncoding& encoding,
+                               std::span<const std::uint32_t> vertices)
+    : transfer_(transfer) {
+  EXPECTS(!vertices.empty());
+  form_.components = encoding.components;
+  const std::size_t count = form_.expected_count(transfer);
+  form_.scale.assign(count, 0.0);
+  form_.offset.assign(count, 0.0);
+  if (!form_.raw()) weights_ = weights_and_lamps(transfer, encoding);
+  measure_ranges(vertices);
+  choose_bits(encoding);
+}
+
+const float* StoredTransfer::numbers_of(std::size_t vertex) const {
+  return form_.raw() ? transfer_.at(vertex, 0) : &weights_[vertex * form_.count()];
+}
+
+void StoredTransfer::measure_ranges(std::span<const std::uint32_t> vertices) {
+  const std::size_t count = form_.count();
+  std::vector<double> low(count, std::numeric_limits<double>::infinity());
+  std::vector<double> high(count, -std::numeric_limits<double>::infinity());
+  for (const auto v : vertices) {
+    const float* numbers = numbers_of(v);
+    for (std::size_t j = 0; j < count; ++j) {
+      EXPECTS(std::isfinite(numbers[j]));
+      low[j] = std::min<double>(low[j], numbers[j]);
+      high[j] = std::max<double>(high[j], numbers[j]);
+    }
+  }
+  for (std::size_t j = 0; j < count; ++j) {
+    form_.scale[j] = (high[j] - low[j]) / 2;
+    form_.offset[j] = low[j] + form_.scale[j];
+  }
+}
+
+/// As many levels as give weights steps of at most `weight_step`; `bits` where none is asked for, and for lamps.
+void StoredTransfer::choose_bits(const TransferEncoding& encoding) {
+  const std::size_t rank = form_.raw() ? 0 : form_.components.rank();
+  bits_.assign(vec4s_of(form_.count()), encoding.bits);
+  for (std::size_t k = 0; k < bits_.size() && 4 * k < rank && encoding.weight_step > 0; ++k) {
+    const std::size_t end = std::min(4 * k + 4, rank);
+    double widest = 0;
+    for (std::size_t j = 4 * k; j < end; ++j) widest = std::max(widest, form_.scale[j]);
+    const double bits = std::ceil(std::log2(2 * widest / encoding.weight_step + 1));
+    const bool lamps_too = end < std::min(4 * k + 4, form_.count());
+    bits_[k] = static_cast<int>(std::clamp<double>(bits, lamps_too ? encoding.bits : kFewestBits, kMostBits));
+    for (std::size_t j = 4 * k; j < end; ++j) {
+      if (form_.scale[j] > 0) form_.scale[j] = widest;  // equal steps in all four
+    }
+  }
+}
+
+std::vector<float> StoredTransfer::pack(std::size_t k, std::span<const std::uint32_t> vertices) const {
+  std::vector<float> out(vertices.size() * 4, 0.0F);
+  const std::size_t end = std::min(4 * k + 4, form_.count());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const float* numbers = numbers_of(vertices[i]);
+    for (std::size_t j = 4 * k; j < end; ++j) {
+      if (form_.scale[j] == 0) continue;
+      const double stored = (numbers[j] - form_.offset[j]) / form_.scale[j];
+      out[i * 4 + j - 4 * k] = static_cast<float>(std::clamp(stored, -1.0, 1.0));
+    }
+  }
+  return out;
+}
+
+std::vector<float> StoredTransfer::read_back(std::size_t vertex, bool rounded) const {
+  const float* exact = numbers_of(vertex);
+  std::vector<float> numbers(exact, exact + form_.count()), slots(transfer_.stride());
+  for (std::size_t j = 0; j < numbers.size() && rounded; ++j) {
+    const double step = 2 * form_.scale[j] / (std::exp2(bits_[j / 4]) - 1), low = form_.offset[j] - form_.scale[j];
+    if (step > 0) numbers[j] = static_cast<float>(low + step * std::round((numbers[j] - low) / step));
+  }
+  slots_of(form_, transfer_, numbers.data(), slots.data());
+  return slots;
+}
+
+}  // namespace kiln

@@ -1,0 +1,61 @@
+#pragma once
+// What a file stores of transfer vectors: `count` numbers for each vertex, four in a VEC4, normalised.
+//   number[j] = offset[j] + scale[j] * stored[j],  stored in [-1, 1]                                     (1)
+// raw          the numbers are the flat slots themselves, s = channel * slots + i.
+// components   they are weights, and of a scene with lamps the lamps' slot of each channel after them:
+//   slot[s] = mean[s] + sum_k number[k] * row_k[s],   lamps' slot of channel c = number[rank + c]        (2)
+// Error of a number  after b-bit rounding at most scale[j] / (2^b - 1), and float rounding; one that is constant has
+// scale 0 and is exact. What the last VEC4 holds past the last number means nothing.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/artifact/baked_scene.h"
+#include "core/prt/components.h"
+#include "core/prt/transfer.h"
+
+namespace kiln {
+
+inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
+
+/// Equations 1 and 2: how a reader comes from stored numbers to slots.
+struct StoredForm {
+  std::vector<double> scale, offset;
+  Components components;  // rank 0 without rows: raw
+
+  bool raw() const { return components.rows.empty(); }
+  std::size_t count() const { return scale.size(); }
+  /// How many numbers transfer vectors of this shape have in this form.
+  std::size_t expected_count(const Transfer& shape) const;
+};
+
+/// Writes the flat slots of one vertex from its numbers, `count` of them after equation 1.
+void slots_of(const StoredForm&, const Transfer& shape, const float* numbers, float* slots);
+
+/// Transfer vectors on their way into a file.
+class StoredTransfer {
+ public:
+  /// Ranges are those of `vertices`, all that the file will hold. Expects finite coefficients.
+  StoredTransfer(const Transfer&, const TransferEncoding&, std::span<const std::uint32_t> vertices);
+
+  const StoredForm& form() const { return form_; }
+  int bits(std::size_t vec4) const { return bits_[vec4]; }
+  /// The normalised numbers 4k .. 4k+3 of the given vertices.
+  std::vector<float> pack(std::size_t k, std::span<const std::uint32_t> vertices) const;
+  /// The flat slots that a reader finds at a vertex: after rounding to the bits, or before.
+  std::vector<float> read_back(std::size_t vertex, bool rounded) const;
+
+ private:
+  const float* numbers_of(std::size_t vertex) const;
+  void measure_ranges(std::span<const std::uint32_t> vertices);
+  void choose_bits(const TransferEncoding&);
+
+  const Transfer& transfer_;
+  StoredForm form_;
+  std::vector<float> weights_;  // of components, count() for each vertex; raw numbers are the coefficients
+  std::vector<int> bits_;       // of each VEC4
+};
+
+}  // namespace kiln
