@@ -10,6 +10,7 @@
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
+#include "core/bake/checkpoint.h"
 #include "core/bake/compression.h"
 #include "core/bake/job_light.h"
 #include "core/bake/plan.h"
@@ -130,7 +131,7 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   return pass;
 }
 
-PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays) {
+PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, double elapsed_s) {
   const ErrorStats& error = pass.certificate->transport;
   PassRecord out{.order = pass.plan.order,
                  .samples = pass.plan.samples,
@@ -140,6 +141,7 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays) {
                  .rays = rays,
                  .seconds = seconds,
                  .certificate_seconds = pass.certificate->seconds,
+                 .elapsed_s = elapsed_s,
                  .relrmse = error.relrmse,
                  .low = error.interval_low,
                  .high = error.interval_high,
@@ -155,7 +157,7 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays) {
 
 /// A single pass where a quality was asked for; where a promise was made, passes until it is kept or cannot be.
 Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optional<Environment>& light, Plan plan,
-                         Passes& passes, BakeLog& log, Threads& threads) {
+                         Passes& passes, const Checkpoints& checkpoints, BakeLog& log, Threads& threads) {
   constexpr double kFirst = 0.06, kLast = 0.97, kShare = 0.6;  // of what is left of the progress, for each pass
   if (!input.recipe.promise) {
     log.share(0, kLast);
@@ -163,25 +165,28 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
   }
   const Mesh surface = scene.mesh;
   std::optional<Pass> newest;
-  std::optional<Plan> next = std::move(plan);
+  std::optional<Plan> next = passes.resume(parse_checkpoint(checkpoints.last), std::move(plan), scene, threads.count());
+  const double before = passes.all().empty() ? 0 : passes.all().back().elapsed_s;
   for (double done = kFirst; next; done += kShare * (kLast - done)) {
     scene.mesh = surface;
     const double start = log.seconds();
     const std::uint64_t rays = log.rays();
     log.share(done, done + kShare * (kLast - done));
     KILN_TRY(pass, bake_pass(input, scene, light, *next, log, threads));
-    passes.add(record_of(pass, log.seconds() - start, log.rays() - rays));
+    passes.add(record_of(pass, log.seconds() - start, log.rays() - rays, before + log.seconds()));
+    if (checkpoints.save) checkpoints.save(checkpoint_json(passes.all()));
     log.know_error(passes.all().back().relrmse);
     newest = std::move(pass);
     scene.mesh = surface;
-    next = passes.next(newest->plan, scene, log.seconds(), threads.count());
+    next = passes.next(newest->plan, scene, threads.count());
   }
   return std::move(*newest);
 }
 
 }  // namespace
 
-Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Threads& threads) {
+Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Threads& threads,
+                        const Checkpoints& checkpoints) {
   BakeLog log(progress);
   log.begin("read", 0.05);
   KILN_TRY(scene, read_scene(input));
@@ -198,7 +203,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   }
 
   Passes passes(input.recipe.promise, input.recipe.steps.front(), input.recipe.limits);
-  KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, log, threads));
+  KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, checkpoints, log, threads));
 
   log.share(0.97, 1);
   log.begin("preview", 1.0);

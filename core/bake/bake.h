@@ -1,6 +1,7 @@
 #pragma once
 // One bake from bytes to artefacts: the outline of the whole service.
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -34,8 +35,14 @@ struct BakeOutput {
   std::vector<ArtifactFile> files;
 };
 
+/// How a bake in passes outlives its process (checkpoint.h).
+struct Checkpoints {
+  std::string last;                                   // what an earlier bake of the same input saved last; may be empty
+  std::function<void(const std::string& text)> save;  // called after each pass
+};
+
 /// Bakes. Throws Cancelled when `threads` is stopped; a Fault names what is wrong with the input.
-Result<BakeOutput> bake(const BakeInput&, const Progress&, Threads&);
+Result<BakeOutput> bake(const BakeInput&, const Progress&, Threads&, const Checkpoints& = {});
 
 /// The plan of a bake as JSON (what is modelled, what skipped and why, predictions), nothing baked.
 Result<std::string> plan_json(const BakeInput&, Threads&);

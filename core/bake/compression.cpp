@@ -64,7 +64,7 @@ StorageProbes probe_storage(const BakedScene& baked, const TransferEncoding& enc
 
 Compression choose_encoding(const BakedScene& baked, const Plan& plan) {
   using Form = PrtStep::Encoding::Form;
-  const Compression raw{{.bits = plan.encoding.bits.value_or(plan.raw_bits)}};
+  Compression raw{{.bits = plan.encoding.bits.value_or(plan.raw_bits)}};
   if (plan.encoding.form == Form::raw) return raw;
   Compression fewer = components(baked, plan);
   if (plan.encoding.form == Form::components || plan.encoding.rank) return fewer;

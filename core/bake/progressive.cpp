@@ -54,11 +54,11 @@ bool Passes::stuck() const {
          now.rays > 4 * before.rays;
 }
 
-double Passes::time_growth(double elapsed_s) const {
+double Passes::time_growth() const {
   const PassRecord& now = all_.back();
   const double budget = promise_.time_budget_s.value_or(kShareOfWall * limits_.wall_s);
   const double reserve = std::max(0.2, 0.04 * budget);  // preview and report
-  const double left = budget - reserve - elapsed_s - now.certificate_seconds;
+  const double left = budget - reserve - now.elapsed_s - now.certificate_seconds;
   return left / work(now);
 }
 
@@ -147,7 +147,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
 }
 
 /// Truncation falls about as order^-1.5 under skies with a sun: an order is tried only if ten bands may do.
-std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, double elapsed_s, int threads) {
+std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, int threads) {
   constexpr int kStep = 2;
   const PassRecord& now = all_.back();
   const double at_ten = *now.own_relrmse * std::pow(static_cast<double>(now.order) / kMaxShOrder, 1.5);
@@ -157,8 +157,7 @@ std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, d
                                   percent(*now.own_high) +
                                   ": no order up to 10 suffices; a given /steps/0/order bounds transport alone");
   }
-  if (time_growth(elapsed_s) < kLeastGrowth)
-    return end(Ending::time_spent, "the time ended before a higher order was baked");
+  if (time_growth() < kLeastGrowth) return end(Ending::time_spent, "the time ended before a higher order was baked");
   Plan plan = last;
   plan.order = std::min(kMaxShOrder, now.order + kStep);
   plan.prediction = predict(plan, scene, threads);
@@ -169,14 +168,14 @@ std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, d
   return plan;
 }
 
-std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double elapsed_s, int threads) {
+std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, int threads) {
   const PassRecord& now = all_.back();
   if (transport_met()) {
     if (!own_light_bound() || *now.own_high <= *promise_.target_error)
       return end(Ending::target_met, "reached " + percent(now.high) + " of " + percent(*promise_.target_error));
-    return higher_order(last, scene, elapsed_s, threads);
+    return higher_order(last, scene, threads);
   }
-  const double affordable = time_growth(elapsed_s);
+  const double affordable = time_growth();
   if (affordable < kLeastGrowth) {
     return promise_.time_budget_s ? end(Ending::time_spent, "the time is spent; reached " + percent(all_.back().high))
                                   : end(Ending::floor, "reached " + percent(all_.back().high) +
@@ -207,6 +206,20 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, double el
     }
   }
   return grown(last, growth, scene, threads);
+}
+
+Plan Passes::resume(const std::vector<PassRecord>& known, Plan plan, const Scene& scene, int threads) {
+  for (const PassRecord& record : known) {
+    if (record.order != plan.order || record.samples != plan.samples) break;  // of another input after all
+    add(record);
+    auto following = next(plan, scene, threads);
+    if (!following) {  // the bake was cut off between its last pass and its end: that pass is needed again
+      all_.pop_back();
+      break;
+    }
+    plan = std::move(*following);
+  }
+  return plan;
 }
 
 }  // namespace kiln

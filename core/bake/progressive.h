@@ -27,6 +27,7 @@ struct PassRecord {
   std::uint64_t triangles = 0, vertices = 0;  // of the result
   std::uint64_t rays = 0;
   double seconds = 0, certificate_seconds = 0;  // all of it, and the part that does not grow with the work
+  double elapsed_s = 0;                         // of the bake when the pass ended
   double relrmse = 0, low = 0, high = 0;        // transport, with its interval
   std::optional<double> own_relrmse, own_high;  // under the job's own light in full
   ErrorSources sources;
@@ -47,9 +48,12 @@ class Passes {
   const std::vector<PassRecord>& all() const { return all_; }
 
   /// The plan of the next pass; nothing when the promise is kept or cannot be, as outlook() then says.
-  /// `last` is the plan of the newest pass, `input_triangles` and the scene's size limit what can grow,
-  /// `elapsed_s` counts from the start of the bake.
-  std::optional<Plan> next(const Plan& last, const Scene&, double elapsed_s, int threads);
+  /// `last` is the plan of the newest pass, `scene` has the input's mesh. Follows from the records alone.
+  std::optional<Plan> next(const Plan& last, const Scene& scene, int threads);
+
+  /// Takes up the passes that an earlier bake of the same input recorded; the plan of the one to go on with.
+  Plan resume(const std::vector<PassRecord>& known, Plan first, const Scene& scene, int threads);
+
   const Outlook& outlook() const { return outlook_; }
   bool kept() const { return outlook_.ending != Outlook::Ending::floor; }
 
@@ -62,12 +66,12 @@ class Passes {
   bool own_light_bound() const;  // the target bounds the job's own light too: no order was asked for
   bool stuck() const;
   bool free_triangles() const;  // the recipe leaves their number open
-  double time_growth(double elapsed_s) const;
+  double time_growth() const;
   double cost(Growth) const;  // in works of the last pass
   double interpolation_power() const;
   Growth towards(double wanted) const;
   Growth within(double most) const;
-  std::optional<Plan> higher_order(const Plan& last, const Scene&, double elapsed_s, int threads);
+  std::optional<Plan> higher_order(const Plan& last, const Scene&, int threads);
   std::optional<Plan> grown(const Plan& last, Growth, const Scene&, int threads);
 
   Promise promise_;

@@ -141,8 +141,9 @@ int make_plan(const BakeInput& input, Threads& threads) {
   return kExitDone;
 }
 
-int make_bake(const BakeInput& input, Threads& threads) {
-  const auto output = bake(input, progress_to_pipe(), threads);
+int make_bake(const BakeInput& input, const std::string& checkpoint, Threads& threads) {
+  const auto output = bake(input, progress_to_pipe(), threads,
+                           {checkpoint, [](const std::string& text) { tell(WorkerCheckpoint{text}); }});
   if (!output) return refuse(output.error());
   for (const ArtifactFile& file : output->files) {
     write_file("out/" + file.name, file.bytes.data(), file.bytes.size());
@@ -167,7 +168,7 @@ int run_order(const Sandbox& sandbox) {
   Threads threads(order.threads);
   const TermWatch watch(threads);
   const BakeInput input = read_input(order);
-  return order.mode == WorkerMode::plan ? make_plan(input, threads) : make_bake(input, threads);
+  return order.mode == WorkerMode::plan ? make_plan(input, threads) : make_bake(input, order.checkpoint, threads);
 }
 
 int failed(const Fault& fault) try {

@@ -11,6 +11,7 @@
 
 #include "core/bake/recipe.h"
 #include "server/jobs/ids.h"
+#include "server/work/checkpoint_file.h"
 #include "server/work/work_folder.h"
 
 namespace kiln {
@@ -94,7 +95,8 @@ Result<Wrote> persist(const StopSignal& stop, Write&& write) {
 
 class JobRun {
  public:
-  JobRun(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {}
+  JobRun(const Claim& claim, StopSignal& stop, const WorkPlace& place)
+      : claim_(claim), stop_(stop), place_(place), checkpoint_(place.options.checkpoints, claim.ref.job_id) {}
 
   void run() {
     const auto known = claim_.job.force ? std::vector<Artifact>{} : known_result();
@@ -117,8 +119,9 @@ class JobRun {
     const auto limits = limits_of(claim_.job.recipe);
     if (!limits) return fail({limits.error(), 500});
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
-    const auto folder =
-        WorkFolder::make(path, place_.blobs, order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options));
+    WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
+    order.checkpoint = checkpoint_.load();
+    const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
     end_as(bake(*folder, *limits), *folder);
   }
@@ -127,7 +130,8 @@ class JobRun {
     Pulse pulse(claim_, stop_, place_);
     const std::uint64_t memory = limits.memory_mb << 20;
     return run_worker({place_.options.worker_command, folder.path(), memory}, {memory, limits.wall_s}, stop_,
-                      {[&](const ProgressEvent& event) { pulse.progress(event); }, [&] { pulse.tick(); }});
+                      {[&](const ProgressEvent& event) { pulse.progress(event); },
+                       [&](const std::string& text) { checkpoint_.save(text); }, [&] { pulse.tick(); }});
   }
 
   void end_as(const WorkerOutcome& outcome, const WorkFolder& folder) {
@@ -173,12 +177,15 @@ class JobRun {
 
   void succeed(const std::vector<Artifact>& artifacts, bool cached) {
     if (!wrote(persist(stop_, [&] { return place_.store.commit(claim_.ref, artifacts, cached); }))) return;
+    checkpoint_.remove();
     ++place_.counters.succeeded;
     if (cached) ++place_.counters.cached;
   }
 
   void fail(const JobError& error) {
-    if (wrote(persist(stop_, [&] { return place_.store.fail(claim_.ref, error); }))) ++place_.counters.failed;
+    if (!wrote(persist(stop_, [&] { return place_.store.fail(claim_.ref, error); }))) return;
+    checkpoint_.remove();
+    ++place_.counters.failed;
   }
 
   void after_stop() {
@@ -219,12 +226,14 @@ class JobRun {
   void finish_cancel() {
     const auto ended = persist(stop_, [&] { return place_.store.finish_cancel(claim_.ref); });
     if (!ended) return;
+    checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);
   }
 
   const Claim& claim_;
   StopSignal& stop_;
   const WorkPlace& place_;
+  const CheckpointFile checkpoint_;
 };
 
 Result<std::string> read_text(const std::filesystem::path& file) {

@@ -24,6 +24,7 @@ struct WorkCounters {
 
 struct WorkOptions {
   std::filesystem::path folder;             // <data>/work
+  std::filesystem::path checkpoints;        // <data>/checkpoints
   std::vector<std::string> worker_command;  // see WorkerStart
   int threads = 1;                          // when the recipe does not say
   Millis first_retry{10'000};

@@ -63,6 +63,8 @@ class Watch {
         return end(Kind::internal, {"internal", "the worker named an impossible result", ""}, SIGKILL);
       }
       outcome_.artifacts.push_back(*artifact);
+    } else if (const auto* checkpoint = std::get_if<WorkerCheckpoint>(&*line)) {
+      if (!ended_by_us() && news_.checkpoint) news_.checkpoint(checkpoint->text);
     } else if (const auto* fault = std::get_if<Fault>(&*line)) {
       told_ = *fault;
     } else {

@@ -52,6 +52,7 @@ struct WorkerOutcome {
 
 struct WorkerNews {
   std::function<void(const ProgressEvent&)> progress;
+  std::function<void(const std::string&)> checkpoint;
   std::function<void()> tick;  // at least every 0.25 s
 };
 

@@ -7,6 +7,7 @@
 
 #include "core/base/sha256.h"
 #include "server/jobs/sqlite_store.h"
+#include "server/work/checkpoint_file.h"
 #include "server/work/content_key.h"
 #include "server/work/data_folder.h"
 #include "server/work/event_stream.h"
@@ -145,7 +146,8 @@ class LocalUpload final : public AssetUpload {
 WorkOptions LocalService::work_options() const {
   const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
-  return {options_.data / "work", options_.worker_command, threads, options_.first_retry, options_.require_sandbox};
+  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads,
+          options_.first_retry,   options_.require_sandbox};
 }
 
 void LocalService::drain() {
@@ -313,12 +315,14 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   KILN_TRY(blobs, BlobStore::open(options.data));
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
+  if (!error) std::filesystem::create_directories(options.data / "checkpoints", error);
   if (error) return fault("io_failed", "the work folder cannot be made");
   // What an earlier server left behind: its workers died with it.
   remove_work_folders(options.data / "work");
   blobs->remove_dead_writers();
   KILN_TRY(requeued, store->reap(true));
   static_cast<void>(requeued);
+  remove_stale_checkpoints(options.data / "checkpoints", *store);
   return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
 }
 

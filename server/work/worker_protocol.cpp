@@ -9,7 +9,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxText = 4096;  // of one text in a line
+constexpr std::size_t kMaxText = 4096;  // of one text in a line,
+constexpr std::size_t kMaxCheckpoint = 32768;
 
 /// Text that may hold anything, as JSON that any reader takes.
 std::string dump(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
@@ -48,6 +49,7 @@ struct LineWriter {
   json operator()(const Fault& f) const {
     return {{"fault", {{"code", f.code}, {"message", f.message}, {"where", f.where}}}};
   }
+  json operator()(const WorkerCheckpoint& c) const { return {{"checkpoint", c.text}}; }
   json operator()(const WorkerDone&) const { return {{"done", true}}; }
 };
 
@@ -56,6 +58,11 @@ WorkerLine read_line(const json& line) {
   if (line.contains("artifact")) {
     const json& value = line["artifact"];
     return WorkerArtifact{short_text(value.at("name")), short_text(value.at("media_type"))};
+  }
+  if (line.contains("checkpoint")) {
+    WorkerCheckpoint checkpoint{line["checkpoint"].get<std::string>()};
+    if (checkpoint.text.size() > kMaxCheckpoint) checkpoint.text.clear();
+    return checkpoint;
   }
   if (line.contains("fault")) {
     const json& value = line["fault"];
@@ -83,6 +90,7 @@ std::string order_json(const WorkerOrder& order) {
                {"mode", order.mode == WorkerMode::plan ? "plan" : "bake"},
                {"threads", order.threads},
                {"parent", order.parent},
+               {"checkpoint", order.checkpoint},
                {"require_sandbox", order.require_sandbox}});
 }
 
@@ -96,6 +104,7 @@ Result<WorkerOrder> parse_order(std::string_view text) try {
   order.mode = value.at("mode") == "plan" ? WorkerMode::plan : WorkerMode::bake;
   order.threads = value.at("threads").get<int>();
   order.parent = value.at("parent").get<int>();
+  order.checkpoint = value.at("checkpoint").get<std::string>();
   order.require_sandbox = value.at("require_sandbox").get<bool>();
   return order;
 } catch (const json::exception&) {

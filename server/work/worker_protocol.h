@@ -2,6 +2,7 @@
 // What supervisor and worker tell each other: job.json down, JSON lines on descriptor 3 up, an exit code at the end.
 //   {"progress":{"stage","done","total","fraction"[,"error"]}}   {"artifact":{"name","media_type"}}
 //   {"fault":{"code","message","where"}}               {"done":true}
+//   {"checkpoint":"..."}    what the next worker of the same job gets back in its order (core/bake/checkpoint.h)
 
 #include <filesystem>
 #include <optional>
@@ -29,6 +30,7 @@ struct WorkerOrder {
   WorkerMode mode = WorkerMode::bake;
   int threads = 0;
   int parent = 0;                // process id of the supervisor: a worker ends when it is gone
+  std::string checkpoint;        // of an earlier worker of this job; empty: none
   bool require_sandbox = false;  // refuse to work where the kernel has not all of server/work/sandbox.h
 };
 
@@ -42,10 +44,13 @@ struct WorkerDone {};
 struct WorkerArtifact {
   std::string name, media_type;
 };
-using WorkerLine = std::variant<ProgressEvent, WorkerArtifact, Fault, WorkerDone>;
+struct WorkerCheckpoint {
+  std::string text;
+};
+using WorkerLine = std::variant<ProgressEvent, WorkerArtifact, WorkerCheckpoint, Fault, WorkerDone>;
 
 std::string line_json(const WorkerLine&);
-/// Nothing for anything that is not exactly one of the four lines: the worker is not to be trusted then.
+/// Nothing for anything that is not exactly one of these lines: the worker is not to be trusted then.
 std::optional<WorkerLine> parse_line(std::string_view line);
 
 /// True for names a worker may give: letters, digits, dot, dash, underscore; no leading dot; 1..64 letters.

@@ -179,5 +179,36 @@ TEST_F(KillTest, TermPutsRunningJobsBackAndTheNextStartFinishesThem) {
   }
 }
 
+TEST_F(KillTest, AWorkerKilledBetweenPassesGoesOnWhereItWasAndEndsWithTheSameBytes) {
+  // Four passes and more: a tenth of a second for the first, seconds for the last. Twice, with force, so that the
+  // second is the undisturbed run of the same job.
+  json document = json::parse(cube_job(scene_, 1));
+  document.erase("certificate");
+  document["quality"] = {{"target_error", 0.004}};
+  document["environment"] = {{"builtin", "clear"}};
+  document["steps"] = {{{"do", "prt"}, {"order", 6}}};
+  const auto submit_one = [&](bool force) {
+    document["force"] = force;
+    return json::parse(http_post(daemon_->port(), "/v1/jobs", document.dump(), {}).body).at("id").get<std::string>();
+  };
+  const auto sha_of_scene = [](const json& done) {
+    for (const json& artifact : done["artifacts"])
+      if (artifact["name"] == "scene.glb") return artifact["sha256"].get<std::string>();
+    return std::string("no scene.glb");
+  };
+  const std::string id = submit_one(false);
+  const auto deadline = Clock::now() + 60s;
+  while (!std::filesystem::exists(folder_ / "data" / "checkpoints" / id) && Clock::now() < deadline)
+    std::this_thread::sleep_for(2ms);
+  ASSERT_TRUE(kill_a_worker()) << "the bake ended before it could be killed";
+  const json cut = json::parse(http_get(daemon_->port(), "/v1/jobs/" + id + "?wait=60").body);
+  expect_sound(cut);
+  EXPECT_EQ(cut["attempt"], 2);
+  const json whole = json::parse(http_get(daemon_->port(), "/v1/jobs/" + submit_one(true) + "?wait=60").body);
+  EXPECT_EQ(whole["attempt"], 1);
+  EXPECT_EQ(sha_of_scene(cut), sha_of_scene(whole));
+  EXPECT_EQ(entries(folder_ / "data" / "checkpoints"), 0);
+}
+
 }  // namespace
 }  // namespace kiln::testing

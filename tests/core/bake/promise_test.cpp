@@ -8,6 +8,7 @@
 #include "core/artifact/baked_scene.h"
 #include "core/bake/bake.h"
 #include "core/bake/certificate.h"
+#include "core/bake/checkpoint.h"
 #include "core/bake/job_light.h"
 #include "core/bake/progressive.h"
 #include "tests/core/bake/bake_input.h"
@@ -132,7 +133,7 @@ Plan next_after(const PassRecord& pass) {
   Plan plan;
   plan.samples = pass.samples;
   plan.subdivide.triangles = pass.triangles;
-  return *passes.next(plan, Scene{}, 1, 1);
+  return *passes.next(plan, Scene{}, 1);
 }
 
 TEST(Promise, TheNextPassSpendsOnTheLargestSource) {
@@ -147,7 +148,7 @@ TEST(Promise, TheNextPassSpendsOnTheLargestSource) {
 TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
   Passes passes({.target_error = 0.02}, {.order = 6}, {});
   passes.add(pass_with(0.01, 0.01));
-  EXPECT_FALSE(passes.next({}, Scene{}, 1, 1));
+  EXPECT_FALSE(passes.next({}, Scene{}, 1));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::target_met);
   EXPECT_TRUE(passes.kept());
 }
@@ -159,11 +160,12 @@ TEST(Promise, TheCostOfRaysIsLearntFromTwoPasses) {
   PassRecord first = pass_with(0.05, 0.001), second = first;
   first.samples = 16;
   first.seconds = 0.5;
+  second.elapsed_s = 5.6;  // 3 s are left for what took 1 s
   passes.add(first);
   passes.add(second);
   Plan plan;
   plan.samples = second.samples;
-  const auto next = passes.next(plan, Scene{}, 5.6, 1);  // 3 s are left for what took 1 s
+  const auto next = passes.next(plan, Scene{}, 1);
   ASSERT_TRUE(next);
   // a + 16 b = .5 and a + 64 b = 1: b = 1 / 96, a = 1 / 3, and 2.7 s are 227 rays; 173 by rays alone.
   EXPECT_GT(next->samples, 192);
@@ -172,10 +174,49 @@ TEST(Promise, TheCostOfRaysIsLearntFromTwoPasses) {
 
 TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
   Passes passes({.target_error = 0.02}, {.order = 6}, {.wall_s = 10});
-  passes.add(pass_with(0.05, 0.05));
-  EXPECT_FALSE(passes.next({}, Scene{}, 8, 1));
+  PassRecord pass = pass_with(0.05, 0.05);
+  pass.elapsed_s = 8;
+  passes.add(pass);
+  EXPECT_FALSE(passes.next({}, Scene{}, 1));
   EXPECT_FALSE(passes.kept());
   EXPECT_NE(passes.outlook().reason.find("/limits/wall_s"), std::string::npos);
+}
+
+TEST(Promise, ABakeThatWasCutOffGoesOnAndEndsWithTheSameBytes) {
+  Threads threads;
+  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.08})"));
+  std::vector<std::string> saved;
+  const auto save = [&](const std::string& text) { saved.push_back(text); };
+  const auto whole = bake(input, {}, threads, {{}, save});
+  ASSERT_TRUE(whole);
+  const std::size_t passes = saved.size();
+  ASSERT_GE(passes, 2U);
+  for (std::size_t after = 1; after <= passes; ++after) {
+    const std::string last = saved[after - 1];
+    std::size_t done = 0;
+    const auto resumed = bake(input, {}, threads, {last, [&](const std::string&) { ++done; }});
+    ASSERT_TRUE(resumed);
+    EXPECT_EQ(done, after < passes ? passes - after : 1) << "cut off after pass " << after;
+    EXPECT_EQ(file(*resumed, "scene.glb"), file(*whole, "scene.glb"));
+    EXPECT_EQ(report_of(*resumed)["promise"]["passes"].size(), passes);
+  }
+  for (const char* nonsense : {"nonsense", "{}", R"({"engine":"0","passes":[]})", R"({"engine":"kiln","passes":[1]})"})
+    EXPECT_TRUE(parse_checkpoint(nonsense).empty());
+}
+
+TEST(Promise, RecordsComeBackFromACheckpointBitForBit) {
+  PassRecord pass = pass_with(0.1, 1.0 / 3);
+  pass.own_high = 1e-300;
+  pass.sources.truncation = 0.1 + 0.2;
+  pass.elapsed_s = 2.0 / 3;
+  const auto back = parse_checkpoint(checkpoint_json(std::vector{pass, pass}));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[1].own_high, pass.own_high);
+  EXPECT_EQ(back[1].own_relrmse, std::nullopt);
+  EXPECT_EQ(back[1].sources.truncation, pass.sources.truncation);
+  EXPECT_EQ(back[1].sources.interpolation, pass.sources.interpolation);
+  EXPECT_EQ(back[1].elapsed_s, pass.elapsed_s);
+  EXPECT_EQ(back[1].triangles, pass.triangles);
 }
 
 TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
@@ -185,7 +226,7 @@ TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
     pass.rays = 1'000'000ULL << (2 * i);
     passes.add(pass);
   }
-  EXPECT_FALSE(passes.next({}, Scene{}, 1, 1));
+  EXPECT_FALSE(passes.next({}, Scene{}, 1));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::floor);
 }
 

@@ -2,6 +2,7 @@
 //
 //   ok        two artefacts         slow     the same after 1 s of progress
 //   crash     SIGSEGV               crash-once   SIGSEGV unless the file in `marker` exists, which it makes
+//   resume    saves a checkpoint and crashes; with a checkpoint in its order it makes it a result
 //   hang      sleeps, ends on TERM  stubborn     sleeps, ignores TERM
 //   oom       touches memory until it is stopped   bad-alloc   says out_of_memory
 //   garbage   bytes that are no line               silent      exit 0 without a word
@@ -85,6 +86,15 @@ int crash_once(const std::string& scene) {
   crash();
 }
 
+int resume(const std::string& scene, const std::string& checkpoint) {
+  if (checkpoint.empty()) {
+    tell({{"checkpoint", "as far as this"}});
+    crash();
+  }
+  artifact("log.txt", checkpoint);
+  return finish(scene);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -99,6 +109,7 @@ int main(int argc, char** argv) {
   }
   if (label == "crash") crash();
   if (label == "crash-once") return crash_once(scene);
+  if (label == "resume") return resume(scene, order["checkpoint"]);
   if (label == "stubborn") ::signal(SIGTERM, SIG_IGN);
   if (label == "hang" || label == "stubborn") sleep_for_ever();
   if (label == "oom") return eat_memory();

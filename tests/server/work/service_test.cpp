@@ -76,6 +76,24 @@ TEST_F(ServiceTest, ACrashIsRetriedOnce) {
   EXPECT_EQ(job.crashes, 1);
 }
 
+TEST_F(ServiceTest, ACheckpointOutlivesItsWorkerAndGoesWithItsJob) {
+  start();
+  const Job job = finish("resume");
+  ASSERT_EQ(job.state, JobState::succeeded) << failure(job);
+  EXPECT_EQ(job.attempt, 2);
+  const auto file = service_->open_artifact(job.id, "log.txt");
+  ASSERT_TRUE(file);
+  EXPECT_EQ(file->artifact.bytes, std::string("as far as this").size());
+  EXPECT_EQ(entries("checkpoints"), 0U);
+}
+
+TEST_F(ServiceTest, CheckpointsOfJobsThatAreGoneAreRemovedAtTheNextStart) {
+  open();
+  std::ofstream(options_.data / "checkpoints" / "some-job") << "text";
+  open();
+  EXPECT_EQ(entries("checkpoints"), 0U);
+}
+
 TEST_F(ServiceTest, TheSecondCrashFailsTheJobAndPoisonsItsContent) {
   start();
   const Submission bad = submission("crash");

@@ -14,6 +14,8 @@ TEST(WorkerProtocol, EveryLineComesBackAsItWasSent) {
   EXPECT_EQ(artifact.name, "a.glb");
   const auto fault = std::get<Fault>(parse_line(line_json(Fault{"code", "a \"message\"\n", "w"})).value());
   EXPECT_EQ(fault.message, "a \"message\"\n");
+  const std::string text = R"({"passes":["\u00e4"]})";
+  EXPECT_EQ(std::get<WorkerCheckpoint>(parse_line(line_json(WorkerCheckpoint{text})).value()).text, text);
   EXPECT_TRUE(std::holds_alternative<WorkerDone>(parse_line(line_json(WorkerDone{})).value()));
 }
 
@@ -22,8 +24,9 @@ TEST(WorkerProtocol, BytesThatAreNoUtf8StillMakeALine) {
 }
 
 TEST(WorkerProtocol, WhatIsNotExactlyALineIsNothing) {
-  for (const char* line : {"", "{}", "[]", "null", "{", "{\"done\":1}", "{\"progress\":3}", "{\"other\":true}",
-                           "{\"done\":true,\"fault\":{}}", "{\"progress\":{\"stage\":1}}", "\xff\xfe"}) {
+  for (const char* line :
+       {"", "{}", "[]", "null", "{", "{\"done\":1}", "{\"progress\":3}", "{\"other\":true}", "{\"checkpoint\":7}",
+        "{\"done\":true,\"fault\":{}}", "{\"progress\":{\"stage\":1}}", "\xff\xfe"}) {
     EXPECT_FALSE(parse_line(line)) << line;
   }
 }
@@ -43,6 +46,7 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   order.threads = 3;
   order.parent = 17;
   order.require_sandbox = true;
+  order.checkpoint = R"({"a":1})";
   const WorkerOrder back = parse_order(order_json(order)).value();
   EXPECT_EQ(back.inputs.scene, order.inputs.scene);
   EXPECT_EQ(back.inputs.resources, order.inputs.resources);
@@ -52,6 +56,7 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   EXPECT_EQ(back.threads, 3);
   EXPECT_EQ(back.parent, 17);
   EXPECT_TRUE(back.require_sandbox);
+  EXPECT_EQ(back.checkpoint, order.checkpoint);
 }
 
 TEST(WorkerProtocol, ResultNamesCannotLeaveTheirFolder) {
