@@ -13,6 +13,7 @@
 #include "core/bake/checkpoint.h"
 #include "core/bake/compression.h"
 #include "core/bake/job_light.h"
+#include "core/bake/lightings.h"
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
 #include "core/bake/progressive.h"
@@ -54,12 +55,11 @@ std::string provenance(const BakeInput& input) {
 }
 
 /// The baked scene before it is written: transport, the job's light, and an exposure that suits both.
-BakedScene assemble(Scene scene, Transfer transfer, const std::optional<Environment>& light,
-                    std::string provenance_json) {
+BakedScene assemble(Scene scene, Transfer transfer, BakedLight light, std::string provenance_json) {
   BakedScene baked;
   baked.scene = std::move(scene);
   baked.transfer = std::move(transfer);
-  if (light) baked.light = {light->name, project_environment(*light, baked.transfer.order)};
+  baked.light = std::move(light);
   baked.exposure = automatic_exposure(baked.scene.mesh, baked_colors(baked));
   baked.provenance = std::move(provenance_json);
   return baked;
@@ -104,9 +104,11 @@ struct Pass {
 Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional<Environment>& light, Plan plan,
                        BakeLog& log, Threads& threads) {
   Pass pass;
-  Transport transport = solve_transport(scene, plan, input.recipe.seed, log, threads);
+  BakedLight own;
+  if (light) own = {light->name, project_environment(*light, plan.order)};
+  Transport transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
   log.begin("write", 0.9);
-  BakedScene baked = assemble(std::move(scene), std::move(transport.transfer), light, provenance(input));
+  BakedScene baked = assemble(std::move(scene), std::move(transport.transfer), std::move(own), provenance(input));
   const Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   const StorageProbes storage = probe_storage(baked, encoding.transfer, transport.noise.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));

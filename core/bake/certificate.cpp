@@ -207,7 +207,7 @@ class Judge {
       : baked_(baked),
         truth_(truth),
         threads_(threads),
-        lightings_(test_lightings(baked)),
+        lightings_(test_lightings(baked.transfer.order, baked.light)),
         light_(reference_light(baked, environment, lightings_)) {}
 
   Judgement judge(const Probe& probe, int samples, std::uint64_t seed) const {

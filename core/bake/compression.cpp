@@ -26,7 +26,8 @@ double stored_bits(const BakedScene& baked, const TransferEncoding& encoding) {
 
 Compression components(const BakedScene& baked, const Plan& plan) {
   const double share = plan.compression / std::sqrt(2.0);
-  const ComponentAnalysis analysis = analyse_components(baked.transfer, baked.scene.mesh, band_power(baked));
+  const ComponentAnalysis analysis =
+      analyse_components(baked.transfer, baked.scene.mesh, band_power(baked.transfer.order, baked.light));
   const std::size_t most = analysis.components.rank();
   const std::size_t rank =
       plan.encoding.rank ? std::min(most, static_cast<std::size_t>(*plan.encoding.rank)) : rank_for(analysis, share);

@@ -18,7 +18,9 @@ double root(double squared) { return std::sqrt(std::max(0.0, squared)); }
 class Judged {
  public:
   Judged(const Certificate& certificate, const BakedScene& decoded)
-      : transfer_(decoded.transfer), all_(test_lightings(decoded)), certificate_(certificate) {}
+      : transfer_(decoded.transfer),
+        all_(test_lightings(decoded.transfer.order, decoded.light)),
+        certificate_(certificate) {}
 
   /// Mean over the judged lightings of squared(light) / mean_light^2; light[i] of a channel, the lamps' slot last.
   template <class Squared>

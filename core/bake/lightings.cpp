@@ -28,9 +28,8 @@ Environment lobe(const Vec3f& axis) {
 
 }  // namespace
 
-Lightings test_lightings(const BakedScene& baked) {
+Lightings test_lightings(int order, const BakedLight& light) {
   Lightings out;
-  const int order = baked.transfer.order;
   out.names = {"constant", "+x", "-x", "+y", "-y", "+z", "-z"};
   out.sh.push_back(project_environment(constant_sky({1, 1, 1}), order));
   for (int axis = 0; axis < 3; ++axis) {
@@ -40,18 +39,17 @@ Lightings test_lightings(const BakedScene& baked) {
       out.sh.push_back(project_environment(lobe(direction), order));
     }
   }
-  if (!baked.light.coefficients.empty()) {
-    out.names.push_back(baked.light.name);
-    out.sh.push_back(baked.light.coefficients);
+  if (!light.coefficients.empty()) {
+    out.names.push_back(light.name);
+    out.sh.push_back(light.coefficients);
   }
   return out;
 }
 
-std::vector<double> band_power(const BakedScene& baked) {
-  const int order = baked.transfer.order;
+std::vector<double> band_power(int order, const BakedLight& light) {
   std::vector<double> out(static_cast<std::size_t>(order), 4 * M_PI);  // the sun: 4 pi Y(w), of mean square 4 pi
   double count = 1;
-  for (const auto& sh : test_lightings(baked).sh) {
+  for (const auto& sh : test_lightings(order, light).sh) {
     double mean = 0;
     for (std::size_t c = 0; c < 3; ++c) mean += sh[0][c] / 3 / (2 * std::sqrt(M_PI));
     if (!(mean > 0)) continue;

@@ -15,12 +15,12 @@ struct Lightings {
   std::vector<std::vector<Vec3f>> sh;  // sh_count(order) RGB each
 };
 
-/// Of the artefact's own order. A lobe is max(0, w . axis)^4: positive light that no two axes share much of.
-Lightings test_lightings(const BakedScene&);
+/// Of the artefact's own order and light. A lobe is max(0, w . axis)^4: positive light that no two axes share much of.
+Lightings test_lightings(int order, const BakedLight&);
 
 /// Power of the lightings in each band: the mean squared coefficient of light scaled to a mean of 1 over all
 /// directions, had they no preferred direction. Besides the test lightings and the job's own a sun counts, whose bands
 /// are all alike.
-std::vector<double> band_power(const BakedScene&);
+std::vector<double> band_power(int order, const BakedLight&);
 
 }  // namespace kiln

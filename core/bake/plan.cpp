@@ -60,7 +60,11 @@ void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {
   plan.samples = step.samples.value_or(effort.samples);
   plan.bounce_samples = step.samples ? std::max(16, *step.samples / 4) : effort.bounce_samples;
   plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : effort.lamp_samples;
-  decide(plan, "samples", std::to_string(plan.samples), step.samples ? kAsked : effort.reason);
+  plan.noise = step.samples ? 0 : effort.noise;
+  decide(plan, "samples", std::to_string(plan.samples),
+         step.samples
+             ? kAsked
+             : effort.reason + "; a point stops before where " + text(100 * plan.noise) + " % of noise is reached");
 }
 
 void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
@@ -106,13 +110,13 @@ void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision
 Effort effort_of(Quality quality) {
   switch (quality) {
     case Quality::draft:
-      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10, 0.01};
+      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10, 0.02, 0.01};
     case Quality::standard:
-      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12, 0.005};
+      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12, 0.01, 0.005};
     case Quality::finest:
       break;
   }
-  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14, 0.002};
+  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14, 0.0025, 0.002};
 }
 
 // The noise of stratified rays falls nearly as one over their number: about .1 at 16 on the bunny, .015 at 256.
@@ -124,6 +128,7 @@ Effort first_effort(const Promise& promise) {
   effort.tail = std::clamp(target / 10, 5e-4, 0.02);
   effort.triangles = static_cast<std::uint64_t>(std::clamp(100 / target, 500.0, 10'000.0));
   effort.bits = target >= 0.05 ? 10 : target >= 0.01 ? 12 : 14;
+  effort.noise = target / 4;
   effort.compression = std::clamp(target / 10, 2e-4, 0.01);
   return effort;
 }

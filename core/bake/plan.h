@@ -32,7 +32,8 @@ struct Plan {
   int order = 6;
   int bounces = 0;
   double tail_left = 0;      // share of the light in later reflections; 0 where the recipe says how many
-  int samples = 1024;        // rays per point for distant light
+  int samples = 1024;        // most rays per point for distant light
+  double noise = 0;          // relRMSE of these rays at which a point stops; 0: never
   int bounce_samples = 256;  // rays per vertex and bounce
   int lamp_samples = 64;     // shadow rays per point over all emitters
   bool lamps = false;        // the scene has light of its own
@@ -53,6 +54,7 @@ struct Effort {
   std::uint64_t triangles = 0;  // added where light changes
   float threshold = 0;          // of the residual measure; see subdivide.h
   int bits = 12;
+  double noise = 0.01;         // of direct light at a point, as relRMSE: a fifth of the error the quality is for
   double compression = 0.005;  // relRMSE: a tenth of the error that the quality is for
 };
 

@@ -124,6 +124,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   };
   if (!step_.samples) {
     plan.samples = more(last.samples);
+    plan.noise = last.noise / std::sqrt(growth.samples);
     plan.bounce_samples = more(last.bounce_samples);
     plan.lamp_samples = more(last.lamp_samples);
   }

@@ -86,6 +86,7 @@ ordered_json parameters_object(const Plan& plan) {
   return {{"order", plan.order},
           {"bounces", plan.bounces},
           {"samples", plan.samples},
+          {"noise", plan.noise},
           {"bounce_samples", plan.bounce_samples},
           {"lamp_samples", plan.lamp_samples},
           {"triangles", plan.subdivide.triangles},

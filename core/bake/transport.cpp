@@ -19,12 +19,13 @@ namespace {
 /// open point.
 class DirectSource {
  public:
-  DirectSource(const Tracer& tracer, const Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads)
+  DirectSource(const Tracer& tracer, const Plan& plan, const DirectTransfer& sky, BakeLog& log, Threads& threads)
       : tracer_(tracer),
         log_(log),
-        sky_(tracer, {.order = plan.order, .samples = plan.samples, .seed = seed}),
+        sky_(tracer, sky),
+        rough_sky_(tracer, rough(sky)),
         plan_(plan),
-        seed_(seed),
+        seed_(sky.seed),
         threads_(threads),
         lamp_scale_(plan.lamps ? measure_lamp_scale() : 1) {}
 
@@ -35,18 +36,25 @@ class DirectSource {
   /// Lamp light and the constant band stay within what was sampled: no vertex is darker than black.
   ValueSource source() {
     ValueSource s{
-        .width = width(), .values = std::ref(*this), .bounded = {lamp_columns()}, .hidden = hidden_test(tracer_)};
+        .width = width(),
+        .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
+        .bounded = {lamp_columns()},
+        .hidden = hidden_test(tracer_),
+        .rough =
+            [this](std::span<const TransferPoint> batch) {
+              return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRough));
+            }};
     if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
     return s;
   }
 
-  std::vector<float> operator()(std::span<const TransferPoint> batch) {
+  std::vector<float> light(std::span<const TransferPoint> batch, const DirectTransferBaker& baker, int lamp_samples) {
     points += batch.size();
     log_.advance(std::min(points, expected_points()), expected_points());
-    std::vector<float> sky = sky_.bake(batch, threads_, &stats);
+    std::vector<float> sky = baker.bake(batch, threads_, &stats);
     if (!plan_.lamps) return sky;
     const std::vector<Vec3f> lamps =
-        bake_fixed_direct(tracer_, batch, {.samples = plan_.lamp_samples, .seed = seed_}, threads_, &stats);
+        bake_fixed_direct(tracer_, batch, {.samples = lamp_samples, .seed = seed_}, threads_, &stats);
     return join(sky, lamps);
   }
 
@@ -66,6 +74,11 @@ class DirectSource {
   std::uint64_t points = 0;  // asked for so far
 
  private:
+  static constexpr int kRough = 4;  // fewer rays for points that only tell where to split
+  static DirectTransfer rough(DirectTransfer sky) {
+    sky.samples = std::max(16, sky.samples / kRough);
+    return sky;
+  }
   static constexpr float kOpenConstantBand = 0.2820948F;  // t_0 of an unoccluded point: Y(0,0)
 
   /// From about a thousand vertices spread over the input, whatever batches will be asked for.
@@ -97,7 +110,7 @@ class DirectSource {
 
   const Tracer& tracer_;
   BakeLog& log_;
-  DirectTransferBaker sky_;
+  DirectTransferBaker sky_, rough_sky_;
   const Plan& plan_;
   std::uint64_t seed_;
   Threads& threads_;
@@ -150,15 +163,34 @@ std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::ui
   return out;
 }
 
-/// Direct light in two independent draws: the second minus the first, shaped as NoiseProbes.
+/// How the rays for distant light are spent: each point to the noise of the plan, relative to the mean light of about a
+/// thousand vertices. Interpolation halves the variance of what vertices have.
+DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
+                        std::uint64_t seed, Threads& threads) {
+  constexpr int kPilot = 64;
+  DirectTransfer out{.order = plan.order, .samples = plan.samples, .seed = seed};
+  if (!(plan.noise > 0)) return out;
+  const std::vector<TransferPoint> all = vertex_points(tracer.scene().mesh);
+  std::vector<TransferPoint> some;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
+  double mean = 0;
+  for (const float t : bake_direct_transfer(tracer, some, {.order = 1, .samples = kPilot, .seed = seed}, threads))
+    mean += 2 * std::sqrt(M_PI) * t / static_cast<double>(some.size());
+  out.tolerance = static_cast<float>(std::sqrt(2.0) * plan.noise * std::max(mean, 0.01));
+  for (const double p : band_power) out.band_power.push_back(static_cast<float>(p));
+  return out;
+}
+
+/// Direct light in two independent draws: the second minus the first, shaped as Probes.
 std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPoint>& points, const Plan& plan,
-                              std::uint64_t seed, Threads& threads) {
+                              const DirectTransfer& rays, Threads& threads) {
   const auto bands = static_cast<std::size_t>(sh_count(plan.order)), slots = bands + (plan.lamps ? 1 : 0);
   std::vector<float> out(points.size() * 3 * slots, 0.0F);
   for (const float sign : {-1.0F, 1.0F}) {
-    const std::uint64_t draw = sign < 0 ? seed : mix64(seed ^ 0x6e6f697365ULL);
-    const std::vector<float> sky =
-        bake_direct_transfer(tracer, points, {.order = plan.order, .samples = plan.samples, .seed = draw}, threads);
+    const std::uint64_t draw = sign < 0 ? rays.seed : mix64(rays.seed ^ 0x6e6f697365ULL);
+    DirectTransfer redrawn = rays;
+    redrawn.seed = draw;
+    const std::vector<float> sky = bake_direct_transfer(tracer, points, redrawn, threads);
     std::vector<Vec3f> lamps(points.size());
     if (plan.lamps) lamps = bake_fixed_direct(tracer, points, {.samples = plan.lamp_samples, .seed = draw}, threads);
     for (std::size_t p = 0; p < points.size(); ++p) {
@@ -183,7 +215,8 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 
 }  // namespace
 
-Transport solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads) {
+Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& band_power, std::uint64_t seed,
+                          BakeLog& log, Threads& threads) {
   std::vector<float> sky;
   std::vector<Vec3f> lamps;
   std::vector<StandIn> stand_ins;
@@ -192,14 +225,15 @@ Transport solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog&
   log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
-    DirectSource source(tracer, plan, seed, log, threads);
+    const DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
+    DirectSource source(tracer, plan, rays, log, threads);
     Subdivided direct = bake_direct(scene.mesh, plan, source, threads);
     source.separate(direct.values, sky, lamps);
     stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats.rays);
     skip_bounces_of_open_scene(plan, source);
     out.noise.vertices = choose_probes(direct.mesh);
-    direct_noise = draw_twice(tracer, points_at(direct.mesh, out.noise.vertices), plan, seed, threads);
+    direct_noise = draw_twice(tracer, points_at(direct.mesh, out.noise.vertices), plan, rays, threads);
     return std::move(direct.mesh);
   }();
   scene.mesh = std::move(refined);

@@ -25,6 +25,8 @@ struct Transport {
 
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.
-Transport solve_transport(Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads);
+/// `band_power` as in lightings.h: by it rays are spent.
+Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& band_power, std::uint64_t seed,
+                          BakeLog& log, Threads& threads);
 
 }  // namespace kiln

@@ -17,6 +17,7 @@ namespace kiln {
 namespace {
 
 constexpr int kSets = 3;            // 0.5 MB at order 6 and 1024 samples: the cache of one core
+constexpr int kFirstRound = 64;     // rays
 constexpr std::size_t kBlock = 64;  // points of a unit of work
 
 constexpr std::size_t kMaxRow = 104;
@@ -25,23 +26,21 @@ using Row = std::array<float, kMaxRow>;
 }  // namespace
 
 DirectionSets transfer_directions(const DirectTransfer& params) {
-  return DirectionSets(params.order, params.samples, kSets, mix64(params.seed));
+  return DirectionSets(params.order, params.samples, kSets, mix64(params.seed), params.tolerance > 0 ? kFirstRound : 0);
 }
 
 struct DirectTransferBaker::State {
   State(const Tracer& tracer, const DirectTransfer& params)
       : tracer_(tracer), params_(params), sets_(transfer_directions(params)), support_(tracer.scene().mesh.position) {}
 
-  // Writes the transfer vector of a point; true if it took rays.
-  bool bake(const TransferPoint& point, std::uint64_t item, float* out) const {
+  // Writes the transfer vector of a point and counts its rays; true if it took any.
+  bool bake(const TransferPoint& point, std::uint64_t item, std::uint64_t& rays, float* out) const {
     if (is_open(point)) {
       clamped_cosine_transfer(params_.order, point.normal, out);
       return false;
     }
     const LocalFrame frame = local_frame(sets_, point.normal, params_.seed, item);
-    alignas(64) Row sum{};
-    const bool from_closed_form = sum_minority(point, frame, sum);
-    project(point, frame, from_closed_form, sum, out);
+    project(point, frame, sample(point, frame, rays), out);
     return true;
   }
 
@@ -49,27 +48,57 @@ struct DirectTransferBaker::State {
     return !support_.rises_above(p.normal, dot(p.normal, p.position) + kOpenTolerance);
   }
 
-  // Traces all rays; sums the rows of the occluded or of the open ones, whichever are fewer. True: of the occluded.
-  bool sum_minority(const TransferPoint& point, const LocalFrame& frame, Row& sum) const {
+  // Sum over the rows of the occluded or of the open rays, whichever were fewer in the first round.
+  struct Sum {
+    alignas(64) Row row{};
+    bool of_occluded = false;
+    int rays = 0;
+  };
+
+  Sum sample(const TransferPoint& point, const LocalFrame& frame, std::uint64_t& rays) const {
+    Sum sum;
     std::array<std::uint16_t, kMaxPackets> mask;
-    const int packets = sets_.samples() / kPacket;
-    const int occluded = trace(point, frame, std::span(mask).first(static_cast<std::size_t>(packets)));
-    const bool few_occluded = 2 * occluded < sets_.samples();
-    for (int p = 0; p < packets; ++p) {
-      const auto bits = static_cast<std::uint16_t>(few_occluded ? mask[static_cast<std::size_t>(p)]
-                                                                : ~mask[static_cast<std::size_t>(p)]);
-      if (bits != 0) add_rows(sets_.row(frame.set, p * kPacket), sets_.row_width(), bits, sum.data());
+    Row before{};  // mean of the rounds before
+    for (const int end : sets_.rounds()) {
+      const int begin = sum.rays / kPacket;
+      const int occluded = trace(point, frame, begin, std::span(mask).first(static_cast<std::size_t>(end - begin)));
+      if (begin == 0) sum.of_occluded = 2 * occluded < end * kPacket;
+      for (int p = begin; p < end; ++p) {
+        const std::uint16_t hit = mask[static_cast<std::size_t>(p - begin)];
+        const auto bits = static_cast<std::uint16_t>(sum.of_occluded ? hit : ~hit);
+        if (bits != 0) add_rows(sets_.row(frame.set, p * kPacket), sets_.row_width(), bits, sum.row.data());
+      }
+      sum.rays = end * kPacket;
+      if (params_.tolerance > 0 && settled(sum, before, begin > 0)) break;
     }
-    return few_occluded;
+    rays += static_cast<std::uint64_t>(sum.rays);
+    return sum;
   }
 
-  int trace(const TransferPoint& point, const LocalFrame& frame, std::span<std::uint16_t> mask) const {
+  // Whether the error that is left is likely below the tolerance; moves `before` on to the mean of `sum`.
+  bool settled(const Sum& sum, Row& before, bool has_before) const {
+    constexpr float kLeft = 0.7F;
+    float squared = 0;
+    for (int l = 0; l < params_.order; ++l) {
+      float band = 0;
+      for (int i = l * l; i < (l + 1) * (l + 1); ++i) {
+        float& mean = before[static_cast<std::size_t>(i)];
+        const float now = sum.row[static_cast<std::size_t>(i)] / static_cast<float>(sum.rays);
+        band += (now - mean) * (now - mean);
+        mean = now;
+      }
+      squared += params_.band_power[static_cast<std::size_t>(l)] * band;
+    }
+    return has_before && kLeft * squared <= params_.tolerance * params_.tolerance;
+  }
+
+  int trace(const TransferPoint& point, const LocalFrame& frame, int first, std::span<std::uint16_t> mask) const {
     Rays16 rays;
     const Vec3f origin = ray_origin(point);
     rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
     int occluded = 0;
     for (std::size_t p = 0; p < mask.size(); ++p) {
-      sets_.turn(frame.set, static_cast<int>(p), frame.basis, rays);
+      sets_.turn(frame.set, first + static_cast<int>(p), frame.basis, rays);
       mask[p] = static_cast<std::uint16_t>(tracer_.occluded16(rays));
       occluded += std::popcount(mask[p]);
     }
@@ -77,14 +106,14 @@ struct DirectTransferBaker::State {
   }
 
   // t = closed form - occluded / N, or open / N; the sum is turned from the local frame into world axes once.
-  void project(const TransferPoint& point, const LocalFrame& frame, bool from_closed_form, Row& sum, float* out) const {
-    const float weight = 1.0F / static_cast<float>(sets_.samples());
+  void project(const TransferPoint& point, const LocalFrame& frame, Sum sum, float* out) const {
+    const float weight = 1.0F / static_cast<float>(sum.rays);
     const int count = sh_count(params_.order);
-    rotate_sh(params_.order, frame.basis, sum.data(), sum.data());
-    if (from_closed_form) clamped_cosine_transfer(params_.order, point.normal, out);
+    rotate_sh(params_.order, frame.basis, sum.row.data(), sum.row.data());
+    if (sum.of_occluded) clamped_cosine_transfer(params_.order, point.normal, out);
     for (int i = 0; i < count; ++i) {
-      const float part = weight * sum[static_cast<std::size_t>(i)];
-      out[i] = from_closed_form ? out[i] - part : part;
+      const float part = weight * sum.row[static_cast<std::size_t>(i)];
+      out[i] = sum.of_occluded ? out[i] - part : part;
     }
   }
 
@@ -98,6 +127,7 @@ struct DirectTransferBaker::State {
 DirectTransferBaker::DirectTransferBaker(const Tracer& tracer, const DirectTransfer& params) {
   EXPECTS(params.order >= 1 && params.order <= kMaxShOrder);
   EXPECTS(params.samples >= 1 && params.samples <= 65536);
+  EXPECTS(params.tolerance == 0 || params.band_power.size() == static_cast<std::size_t>(params.order));
   state_ = std::make_unique<State>(tracer, params);
 }
 
@@ -108,17 +138,18 @@ std::vector<float> DirectTransferBaker::bake(std::span<const TransferPoint> poin
   const auto width = static_cast<std::size_t>(sh_count(state_->params_.order));
   std::vector<float> out(points.size() * width);
   const std::vector<std::uint32_t> order = morton_order_of(points);
-  std::atomic<std::uint64_t> traced = 0;
+  std::atomic<std::uint64_t> traced = 0, all_rays = 0;
   threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    std::uint64_t count = 0;
+    std::uint64_t count = 0, rays = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t v = order[i];
-      count += state_->bake(points[v], point_key(points[v]), out.data() + v * width) ? 1 : 0;
+      count += state_->bake(points[v], point_key(points[v]), rays, out.data() + v * width) ? 1 : 0;
     }
     traced += count;
+    all_rays += rays;
   });
   if (stats != nullptr) {
-    stats->rays += traced * static_cast<std::uint64_t>(state_->sets_.samples());
+    stats->rays += all_rays;
     stats->open_points += points.size() - traced;
   }
   return out;

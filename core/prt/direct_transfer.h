@@ -17,10 +17,17 @@
 
 namespace kiln {
 
+// Rays     rounds of 64, 64, 128, ... up to `samples`. A point stops after the round whose estimate differs so little
+//          from that of the rounds before that its own error is likely below `tolerance`:
+//            error(n)^2 ~ 0.7 sum_i p_l(i) (t_i(n) - t_i(n/2))^2
+//          as halves of a stratified set differ by errors of their own size, which fall as n^-3/4 at shadow edges.
+
 struct DirectTransfer {
   int order = 6;       // bands, 1..kMaxShOrder; coefficients = order^2
-  int samples = 1024;  // rays per point, 1..65536; rounded up to a multiple of 16
+  int samples = 1024;  // most rays per point, 1..65536; rounded up to a multiple of 16
   std::uint64_t seed = 0;
+  float tolerance = 0;                 // of the light of a point, 1 in the open under light of mean 1; 0: all rays
+  std::vector<float> band_power = {};  // p_l: mean squared coefficient of such light in band l; order of them
 };
 
 struct TransferStats {

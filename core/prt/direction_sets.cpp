@@ -13,25 +13,39 @@
 namespace kiln {
 namespace {
 
-std::vector<Vec2f> sorted_square_points(int samples, std::uint64_t seed) {
+std::vector<Vec2f> square_points(const std::vector<int>& rounds, std::uint64_t seed) {
   std::vector<Vec2f> points;
-  for (int i = 0; i < samples; ++i) points.push_back(sobol_owen(static_cast<std::uint32_t>(i), seed));
-  std::sort(points.begin(), points.end(), [](const Vec2f& a, const Vec2f& b) {
-    const std::uint32_t ka = morton_code(a), kb = morton_code(b);
-    return ka != kb ? ka < kb : a.x < b.x;
-  });
+  for (const int round : rounds) {
+    const auto begin = static_cast<std::ptrdiff_t>(points.size());
+    while (points.size() < static_cast<std::size_t>(round) * kPacket)
+      points.push_back(sobol_owen(static_cast<std::uint32_t>(points.size()), seed));
+    std::sort(points.begin() + begin, points.end(), [](const Vec2f& a, const Vec2f& b) {
+      const std::uint32_t ka = morton_code(a), kb = morton_code(b);
+      return ka != kb ? ka < kb : a.x < b.x;
+    });
+  }
   return points;
+}
+
+std::vector<int> rounds_of(int packets, int first) {
+  std::vector<int> out;
+  for (int end = first; end > 0 && end < packets; end *= 2) out.push_back(end);
+  out.push_back(packets);
+  return out;
 }
 
 }  // namespace
 
-DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed)
-    : samples_((samples + kPacket - 1) / kPacket * kPacket), sets_(sets), row_width_((sh_count(order) + 7) / 8 * 8) {
+DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first)
+    : samples_((samples + kPacket - 1) / kPacket * kPacket),
+      sets_(sets),
+      row_width_((sh_count(order) + 7) / 8 * 8),
+      rounds_(rounds_of(samples_ / kPacket, (first + kPacket - 1) / kPacket)) {
   const std::size_t total = index(sets, 0);
   rows_.assign(total * static_cast<std::size_t>(row_width_), 0.0F);
   x_.reserve(total), y_.reserve(total), z_.reserve(total);
   for (int set = 0; set < sets; ++set) {
-    for (const Vec2f& u : sorted_square_points(samples_, mix64(seed ^ static_cast<std::uint64_t>(set)))) {
+    for (const Vec2f& u : square_points(rounds_, mix64(seed ^ static_cast<std::uint64_t>(set)))) {
       const Vec3f w = cosine_hemisphere(u);
       if (order > 0) evaluate_sh(order, w, rows_.data() + x_.size() * static_cast<std::size_t>(row_width_));
       x_.push_back(w.x), y_.push_back(w.y), z_.push_back(w.z);

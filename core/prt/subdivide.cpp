@@ -122,9 +122,9 @@ class Subdivider {
     return true;
   }
 
-  std::vector<float> call_source(std::span<const TransferPoint> points) {
+  std::vector<float> call_source(std::span<const TransferPoint> points, bool rough = false) {
     if (points.empty()) return {};
-    std::vector<float> values = source_.values(points);
+    std::vector<float> values = rough && source_.rough ? source_.rough(points) : source_.values(points);
     EXPECTS(values.size() == points.size() * rows_.width());
     evaluated_ += points.size();
     return values;
@@ -203,7 +203,7 @@ class Subdivider {
     }
     evaluate(mesh_->take_new_points());
     RowStore inner(rows_.width());  // rounded as the others are: a constant has no residual
-    inner.append(call_source(centroid));
+    inner.append(call_source(centroid, true));
 
     std::vector<float> error(leaves.size());
     threads.for_blocks(leaves.size(), kBlock, [&](std::size_t begin, std::size_t end) {

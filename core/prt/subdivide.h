@@ -45,6 +45,8 @@ struct ValueSource {
   std::function<std::vector<float>(std::span<const TransferPoint>)> values;
   std::vector<std::size_t> bounded = {};  // columns that no vertex may have outside the range sampled around it
   HiddenTest hidden = {};                 // none: everything is seen
+  /// The same, rougher: for points that only tell where to split. None: `values`.
+  std::function<std::vector<float>(std::span<const TransferPoint>)> rough = {};
 };
 
 Subdivided subdivide(const Mesh&, const ValueSource&, const Subdivide&, Threads&);

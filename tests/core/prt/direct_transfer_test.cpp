@@ -149,6 +149,56 @@ TEST(Transfer, FastProjectionAgreesWithASlowLoopInDouble) {
   }
 }
 
+/// Squared error under light whose bands all have the power of a sun, in units of an open point under mean light 1.
+double squared_error(const float* a, const float* b, int count) {
+  double sum = 0;
+  for (int i = 0; i < count; ++i) sum += 4 * kPi * (a[i] - b[i]) * (a[i] - b[i]);
+  return sum;
+}
+
+TEST(Transfer, PointsThatStopEarlyKeepTheToleranceAndSaveRays) {
+  const Scene scene = testing::knot_scene();
+  const std::vector<float> sun(4, static_cast<float>(4 * kPi));
+  const std::size_t vertices = scene.mesh.position.size();
+  // Another seed, so that nothing is shared; 16384 rays are 16 to 256 times those compared with.
+  const Baked truth = bake(scene, {.order = 4, .samples = 16384, .seed = 77});
+  const auto rms = [&](const Baked& baked) {
+    double sum = 0;
+    for (std::size_t v = 0; v < vertices; ++v) sum += squared_error(&baked.values[16 * v], &truth.values[16 * v], 16);
+    return std::sqrt(sum / static_cast<double>(vertices));
+  };
+  const Baked all = bake(scene, {.order = 4, .samples = 1024, .seed = 1});
+  std::uint64_t rays = all.stats.rays;
+  for (const float tolerance : {0.05F, 0.1F, 0.2F}) {
+    const Baked some = bake(scene, {.order = 4, .samples = 1024, .seed = 1, .tolerance = tolerance, .band_power = sun});
+    EXPECT_LT(some.stats.rays, rays) << tolerance;
+    rays = some.stats.rays;
+    // Each point's error is likely below the tolerance, not surely: the root mean square is, with what all rays leave.
+    EXPECT_LT(rms(some), tolerance + rms(all)) << tolerance;
+  }
+  EXPECT_LT(rays, all.stats.rays / 3);
+}
+
+TEST(Transfer, ToleranceZeroMeansAllRays) {
+  const Scene scene = testing::column_scene();
+  const Baked all = bake(scene, {.order = 3, .samples = 256});
+  EXPECT_EQ(all.stats.rays, 256 * (scene.mesh.position.size() - all.stats.open_points));
+}
+
+TEST(Transfer, TheRaysOfARoundAreAStratifiedSetOfTheirOwn) {
+  const DirectionSets rounds(2, 1024, 1, 9, 64), few(2, 64, 1, 9);
+  EXPECT_EQ(rounds.rounds(), (std::vector<int>{4, 8, 16, 32, 64}));
+  EXPECT_EQ(few.rounds(), std::vector<int>{4});
+  for (int ray = 0; ray < 64; ++ray) {  // the first round is the set of 64
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(rounds.row(0, ray)[i], few.row(0, ray)[i]);
+  }
+  for (const int end : rounds.rounds()) {  // the mean of a (0, 2)-net of n: within one cell of 1/n of the cosine lobe's
+    double z = 0;
+    for (int ray = 0; ray < 16 * end; ++ray) z += rounds.row(0, ray)[2] / (16.0 * end);
+    EXPECT_NEAR(z, 0.4886025 * 2 / 3, 1.0 / (16 * end)) << end;
+  }
+}
+
 TEST(Transfer, RemovingAnOccluderNeverDarkens) {
   Scene scene = testing::random_scene(4, 40);
   const Baked before = bake(scene, {.order = 1, .samples = 256});
@@ -159,6 +209,11 @@ TEST(Transfer, RemovingAnOccluderNeverDarkens) {
   const std::vector<TransferPoint> points = vertex_points(testing::random_scene(4, 40).mesh);  // the same rays
   const std::vector<float> after = bake_direct_transfer(tracer, points, {.order = 1, .samples = 256}, pool);
   for (std::size_t v = 0; v < points.size(); ++v) EXPECT_GE(after[v] + 1e-6F, before.values[v]);
+}
+
+TEST(Transfer, StoppingEarlyGivesTheSameBitsForAnyThreadCount) {
+  const DirectTransfer early{.order = 3, .samples = 512, .tolerance = 0.1F, .band_power = {12, 12, 12}};
+  EXPECT_EQ(bake(testing::knot_scene(), early, 1).values, bake(testing::knot_scene(), early, 2).values);
 }
 
 TEST(Transfer, TheSameBitsForAnyThreadCount) {
