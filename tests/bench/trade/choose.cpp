@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 
 #include "tests/bench/trade/front.h"
@@ -33,6 +34,27 @@ SettingMeans means_of(const std::string& setting, const std::map<std::string, co
                    0,       geometric_mean(seen),    geometric_mean(job_light)};
   out.error = std::sqrt(out.seen * out.job_light);
   return out;
+}
+
+/// Settings without those that a smaller artefact matches within the noise.
+std::vector<std::size_t> worth_their_bytes(std::span<const SettingMeans> all) {
+  std::vector<std::size_t> order(all.size()), joined;
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return all[a].bytes < all[b].bytes; });
+  for (const std::size_t i : order) {
+    const bool matched = std::any_of(joined.begin(), joined.end(), [&](std::size_t j) {
+      return all[j].seconds <= kTimeNoise * all[i].seconds && all[j].error <= kErrorNoise * all[i].error;
+    });
+    if (!matched) joined.push_back(i);
+  }
+  return joined;
+}
+
+void mark_front(std::span<SettingMeans> all) {
+  const std::vector<std::size_t> joined = worth_their_bytes(all);
+  std::vector<CostError> points;
+  for (const std::size_t i : joined) points.push_back({all[i].seconds, all[i].error});
+  for (const std::size_t k : pareto_front(points)) all[joined[k]].in_front = true;
 }
 
 const SettingMeans* find(std::span<const SettingMeans> all, const std::string& setting) {
@@ -101,13 +123,10 @@ std::vector<SettingMeans> means_over_scenes(std::span<const Row> rows) {
     by_setting[row.setting][row.scene] = &row;
   }
   std::vector<SettingMeans> out;
-  std::vector<CostError> points;
   for (const std::string& setting : order) {
-    if (by_setting[setting].size() != scenes) continue;
-    out.push_back(means_of(setting, by_setting[setting]));
-    points.push_back({out.back().seconds, out.back().error});
+    if (by_setting[setting].size() == scenes) out.push_back(means_of(setting, by_setting[setting]));
   }
-  for (const std::size_t i : pareto_front(points)) out[i].in_front = true;
+  mark_front(out);
   return out;
 }
 
@@ -133,9 +152,11 @@ std::string presets_json(const std::vector<Choice>& choices, std::span<const Set
       {"engine", rows.empty() ? "" : rows.front().engine},
       {"scenes", scenes_of(rows)},
       {"rule",
-       "Of the settings run on all scenes: geometric mean over scenes of processor seconds, and over scenes and both "
-       "judgements (transport where it can be seen, the job's light in full detail) of relRMSE. draft, standard and "
-       "final are the points of the Pareto front of these whose time is nearest, as a ratio, to 1/8, 1 and 8 times "
+       "Of the settings run on all scenes: geometric means over scenes of processor seconds, of bytes, and (over both "
+       "judgements too: transport where it can be seen, the job's light in full detail) of relRMSE. Settings that a "
+       "smaller artefact matches within 20 % of time and 2 % of error are left out; of the others' Pareto front in "
+       "time "
+       "and error draft, standard and final are the points whose time is nearest, as a ratio, to 1/8, 1 and 8 times "
        "that of the standard in force."},
       {"presets", ordered_json::object()},
       {"front", ordered_json::array()}};

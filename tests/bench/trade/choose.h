@@ -6,7 +6,9 @@
 // Error      geometric mean over scenes and over both judgements of accuracy.md: transport where it can be seen, and
 //            the job's light in full detail. So halving either counts the same, and an order is not cheap for holding
 //            less light. Errors below kSmallestError count as that: no interval of 8192 points reaches lower.
-// Front      the settings that no other beats in both.
+// Front      fewest bytes first, a setting joins unless one that has joined is as good: at most kTimeNoise of its time
+//            and kErrorNoise of its error. Of those that joined, what none beats in both time and error. So of settings
+//            that differ by noise alone the smallest artefact stands for all.
 // Choice     with t the time of the standard in force: draft, standard and final are the points of the front whose
 //            time is nearest to t / 8, t and 8 t, as ratios; of two as near, the one of smaller error.
 
@@ -22,6 +24,8 @@
 namespace kiln::trade {
 
 inline constexpr double kSmallestError = 1e-3;
+inline constexpr double kTimeNoise = 1.2;    // as much did the time differ of bakes whose bits alone differed
+inline constexpr double kErrorNoise = 1.02;  // relative; the same points and paths judge all settings of a mesh
 inline constexpr std::array<double, 3> kTimes = {1.0 / 8, 1, 8};  // draft, standard, final; in standards in force
 
 struct SettingMeans {

@@ -47,8 +47,8 @@ Plot plot_of(std::span<const Row> rows, const PresetNames& names, const Cost& co
     series->points.push_back({cost(row), row.seen.relrmse, row.seen.low, row.seen.high, order_of(row) >= order,
                               tip_of(row), preset_of(row, names)});
   }
-  plot.description = "Lines: each scene's Pareto front. Bars: 95 % intervals. Rings: presets. Hollow: fewer than " +
-                     std::to_string(order) + " bands, judged under softer light.";
+  plot.notes = {"Lines: each scene's Pareto front, with 95 % intervals. Rings: the presets in force.",
+                "Hollow: fewer than " + std::to_string(order) + " bands, judged under softer light and in no front."};
   plot.y_label = "transport error, relRMSE where it can be seen";
   plot.y_text = percent_text;
   plot.smallest_y = kSmallestError;

@@ -12,7 +12,7 @@ namespace kiln::trade {
 namespace {
 
 constexpr double kWidth = 800, kHeight = 520;
-constexpr double kLeft = 76, kRight = 24, kTop = 92, kBottom = 62;
+constexpr double kLeft = 76, kRight = 24, kTop = 106, kBottom = 62;
 constexpr std::size_t kColours = 6;
 
 // Contrast of every colour to its ground is at least 4.5 : 1.
@@ -144,15 +144,36 @@ std::string front_line(const PlotSeries& s, std::size_t number, const Plot& plot
   return reach + element("path", {{"d", path}, {"class", "front " + numbered("s", number)}});
 }
 
+struct Label {
+  double x = 0, y = 0;  // of the middle of its box
+  bool overlaps(const Label& other) const { return std::abs(x - other.x) < 66 && std::abs(y - other.y) < 15; }
+};
+
+/// Beside the ring, where no other label is; nothing when it is crowded all around.
+std::string preset_name(const std::string& name, double x, double y, std::vector<Label>& placed) {
+  const double half = 3.8 * static_cast<double>(name.size());
+  for (const double side : {1.0, -1.0}) {
+    for (const double up : {-12.0, 14.0}) {
+      const Label label{x + side * (12 + half), y + up};
+      const bool outside = label.x + half > kWidth - 4 || label.x - half < kLeft;
+      if (outside || std::any_of(placed.begin(), placed.end(), [&](const Label& l) { return l.overlaps(label); }))
+        continue;
+      placed.push_back(label);
+      return text(label.x, label.y + 4, name, "name", "middle");
+    }
+  }
+  return "";
+}
+
 std::string preset_marks(const Plot& plot, const Frame& frame) {
   std::string out;
+  std::vector<Label> placed;
   for (const PlotSeries& s : plot.series) {
     for (const PlotPoint& p : s.points) {
       if (p.preset.empty()) continue;
       const double x = frame.x(p.x), y = frame.y(shown_y(plot, p.y));
       out += element("circle", {{"cx", coordinate(x)}, {"cy", coordinate(y)}, {"r", "9"}, {"class", "ring"}});
-      const bool left = x > kWidth - kRight - 70;
-      out += text(x + (left ? -12 : 12), y - 8, p.preset, "name", left ? "end" : "start");
+      out += preset_name(p.preset, x, y, placed);
     }
   }
   return out;
@@ -166,18 +187,23 @@ std::string legend(const Plot& plot) {
     out += text(x + 17, 53.5, plot.series[i].name, "label", "start");
     x += 34 + 7.4 * static_cast<double>(plot.series[i].name.size());
   }
-  return out + text(kLeft, 76, plot.description, "hint", "start");
+  for (std::size_t i = 0; i < plot.notes.size(); ++i)
+    out += text(kLeft, 75 + 16 * static_cast<double>(i), plot.notes[i], "hint", "start");
+  return out;
 }
 
 }  // namespace
 
 std::vector<double> log_ticks(double low, double high) {
   std::vector<double> out;
-  const bool powers = std::log10(high / low) > 2.5;
+  const double decades = std::log10(high / low);
+  std::vector<double> steps = {1, 2, 5};
+  if (decades > 2.5) steps = {1};
+  if (decades < 0.8) steps = {1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9};
   for (int e = static_cast<int>(std::floor(std::log10(low))); e <= static_cast<int>(std::ceil(std::log10(high))); ++e) {
-    for (const double step : {1.0, 2.0, 5.0}) {
+    for (const double step : steps) {
       const double tick = e < 0 ? step / std::pow(10.0, -e) : step * std::pow(10.0, e);
-      if (tick >= low && tick <= high && (step == 1 || !powers)) out.push_back(tick);
+      if (tick >= low && tick <= high) out.push_back(tick);
     }
   }
   return out;

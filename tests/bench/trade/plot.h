@@ -22,7 +22,8 @@ struct PlotSeries {
 };
 
 struct Plot {
-  std::string title, description;
+  std::string title;
+  std::vector<std::string> notes;  // lines under the legend
   std::string x_label, y_label;
   std::function<std::string(double)> x_text, y_text;  // of a tick
   double smallest_y = 0;                              // what is below is drawn there, and said to be below
@@ -31,7 +32,8 @@ struct Plot {
 
 std::string scatter_svg(const Plot&);
 
-/// 1, 2 and 5 times powers of ten within the range; powers alone where that is more than two and a half decades.
+/// 1, 2 and 5 times powers of ten within the range; powers alone where that is more than two and a half
+/// decades, more between where it is less than eight tenths of one.
 std::vector<double> log_ticks(double low, double high);
 
 }  // namespace kiln::trade

@@ -49,8 +49,8 @@ void add_triangles(std::vector<Setting>& all, const std::string& quality, std::u
 }
 
 /// Samples by triangles: the two knobs that cost most, together.
-void add_factorial(std::vector<Setting>& all, const std::string& quality, std::vector<int> samples,
-                   std::vector<std::uint64_t> more) {
+void add_factorial(std::vector<Setting>& all, const std::string& quality, const std::vector<int>& samples,
+                   const std::vector<std::uint64_t>& more) {
   for (const int s : samples) {
     for (const std::uint64_t m : more)
       add_triangles(all, quality, m, "samples " + std::to_string(s) + ", +" + std::to_string(m) + " triangles",

@@ -146,6 +146,7 @@ TEST(Svg, APlotOfHostileNamesOfOnePointAndOfNoneIsStillAPlot) {
 
 TEST(Svg, TicksAreRoundNumbersWithinTheRange) {
   EXPECT_EQ(log_ticks(0.9, 12), (std::vector<double>{1, 2, 5, 10}));
+  EXPECT_EQ(log_ticks(2.5, 6), (std::vector<double>{3, 4, 5, 6}));
   EXPECT_EQ(log_ticks(0.01, 10), (std::vector<double>{0.01, 0.1, 1, 10}));
 }
 
@@ -183,6 +184,18 @@ TEST(Choose, PresetsAreThePointsOfTheFrontNearestInTime) {
   const auto json = nlohmann::json::parse(presets_json(*choices, means, full_sweep(), rows_of_a_sweep()));
   EXPECT_EQ(json["presets"]["final"]["chosen"]["setting"], "final");
   EXPECT_EQ(json["presets"]["draft"]["in_force"]["setting"], "draft");
+}
+
+TEST(Choose, OfSettingsThatDifferByNoiseTheSmallestArtefactStands) {
+  std::vector<Row> rows = {some_row("a", "large", 8, 0.0499), some_row("a", "small", 8.5, 0.05),
+                           some_row("a", "poor", 8, 0.06)};
+  rows[0].artifact_bytes = 3000;
+  rows[1].artifact_bytes = 2000;
+  rows[2].artifact_bytes = 1000;
+  const auto means = means_over_scenes(rows);
+  EXPECT_FALSE(means[0].in_front);
+  EXPECT_TRUE(means[1].in_front);
+  EXPECT_TRUE(means[2].in_front);  // a little quicker
 }
 
 TEST(Choose, WithoutTheStandardInForceNothingIsChosen) {
