@@ -53,6 +53,27 @@ test('progress and the end of a job arrive without a reload', () =>
     assert.match(await page.locator('#live').innerText(), /hotel room: succeeded/);
   }));
 
+test('a list that was asked for before an event does not undo it', () =>
+  withGallery(async (page) => {
+    const id = jobId('running');
+    let release;
+    const held = new Promise((resolve) => (release = resolve));
+    await page.route('**/v1/jobs?*', async (route) => {
+      const answer = await route.fetch();
+      await held;
+      await route.fulfill({ response: answer });
+    });
+    await page.selectOption('#status', 'running'); // asks for the list
+    mock.emit('progress', { job: id, stage: 'subdivide', done: 3, total: 4, fraction: 0.75, eta_s: 3 });
+    const value = () => page.evaluate((i) => document.querySelector(`[data-job="${i}"] progress`).value, id);
+    await until(page, (i) => document.querySelector(`[data-job="${i}"] progress`).value === 0.75, id);
+    const arrived = page.waitForResponse((response) => response.url().includes('/v1/jobs?'));
+    release();
+    await (await arrived).finished();
+    await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 100)));
+    assert.equal(await value(), 0.75);
+  }));
+
 test('a job’s name is text, whatever it contains', () =>
   withGallery(async (page) => {
     assert.equal(await card(page, 'hostile').locator('h3').innerText(), kHostileLabel);
@@ -127,7 +148,7 @@ test('the connection mends itself and catches up with what happened meanwhile', 
       (id) => document.querySelector(`[data-job="${id}"]`).dataset.status === 'canceled',
       jobId('queued'),
     );
-    assert.equal(await page.locator('.connection').innerText(), 'live');
+    await until(page, () => document.querySelector('.connection').textContent === 'live');
     page.faults.length = 0; // the browser may log the lost stream
   }));
 

@@ -76,8 +76,12 @@ function show(job: Job): void {
   showEmpty();
 }
 
+/// When an event last told of a job, by performance.now().
+const told = new Map<string, number>();
+
 /// A list may arrive after an event that is newer than it.
-function outdated(job: Job): boolean {
+function outdated(job: Job, asked: number): boolean {
+  if (cards.has(job.id) && (told.get(job.id) ?? 0) > asked) return true;
   const known = cards.get(job.id)?.job;
   return known !== undefined && finished(known) && !finished(job) && known.attempt >= job.attempt;
 }
@@ -93,8 +97,9 @@ function showEmpty(): void {
 
 async function load(from: string): Promise<void> {
   try {
+    const asked = performance.now();
     const page = await listJobs({ status: statusFilter.value, cursor: from });
-    page.jobs.filter((job) => !outdated(job)).forEach(show);
+    page.jobs.filter((job) => !outdated(job, asked)).forEach(show);
     cursor = page.next_cursor ?? '';
     more.hidden = cursor === '';
     showEmpty();
@@ -144,4 +149,14 @@ function build(): void {
 
 build();
 void load('');
-follow(undefined, { job: show, progress: (id, progress) => cards.get(id)?.showProgress(progress), connected });
+follow(undefined, {
+  job: (job) => {
+    told.set(job.id, performance.now());
+    show(job);
+  },
+  progress: (id, progress) => {
+    told.set(id, performance.now());
+    cards.get(id)?.showProgress(progress);
+  },
+  connected,
+});
