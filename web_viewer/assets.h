@@ -1,5 +1,6 @@
 #pragma once
-// The built viewer (web_viewer/dist), embedded in the program: what kilnd serves at `/`, `/view/{id}` and `/docs`.
+// The built viewer (web_viewer/dist), embedded in the program: what kilnd serves at `/`, `/view/{id}`, `/docs` and
+// `/trade`.
 
 #include <cstdint>
 #include <span>
@@ -18,7 +19,8 @@ struct Asset {
 
 /// All files, sorted by path. Where dist/ was absent when Kiln was built: index.html, view.html and docs.html, each one
 /// line that says how to build the viewer.
-/// Pages: `/` is index.html, `/view/{id}` is view.html, `/docs` is docs.html, anything else its own path.
+/// Pages: `/` is index.html, `/view/{id}` is view.html, `/docs` is docs.html, `/trade` is trade.html, anything else its
+/// own path.
 std::span<const Asset> viewer_assets();
 
 }  // namespace kiln

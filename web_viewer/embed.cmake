@@ -22,7 +22,7 @@ endfunction()
 
 # A viewer that was never built says so itself.
 function(write_how_to_build folder)
-  foreach(page index view docs)
+  foreach(page index view docs trade)
     file(CONFIGURE OUTPUT ${folder}/${page}.html @ONLY CONTENT
          "<!doctype html><html lang=\"en\"><title>Kiln</title><p>This kilnd was built without its viewer. Build it with: cd web_viewer &amp;&amp; npm ci &amp;&amp; npx vite build, then build kilnd again.</p></html>\n")
   endforeach()

@@ -12,13 +12,14 @@ const dracoAsModule = {
   transform: (code, id) => (id.includes(kDraco) ? { code: `${code}\nexport default DracoDecoderModule;`, map: null } : null),
 };
 
-// The dev server answers as kilnd does: /view/{id} is view.html, /docs is docs.html.
+// The dev server answers as kilnd does: /view/{id} is view.html, /docs is docs.html, /trade is trade.html.
 const pagesOfKilnd = {
   name: 'pages-of-kilnd',
   configureServer(server) {
     server.middlewares.use((request, _response, next) => {
       if (/^\/view\/[^./]+([?#]|$)/.test(request.url)) request.url = '/view.html';
       if (/^\/docs([?#]|$)/.test(request.url)) request.url = '/docs.html';
+      if (/^\/trade([?#]|$)/.test(request.url)) request.url = '/trade.html';
       next();
     });
   },
@@ -36,6 +37,6 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 900,
-    rollupOptions: { input: ['index.html', 'view.html', 'docs.html'].map((page) => resolve(root, page)) },
+    rollupOptions: { input: ['index.html', 'view.html', 'docs.html', 'trade.html'].map((page) => resolve(root, page)) },
   },
 });

@@ -216,6 +216,7 @@ void add_viewer(std::vector<Endpoint>& all) {
   all.push_back({"GET", "/", "galleryPage", "viewer", "Gallery of jobs", {}, {}, 200, page, {}});
   all.push_back({"GET", "/view/{id}", "viewerPage", "viewer", "Viewer of one job", {"id"}, {}, 200, page, {}});
   all.push_back({"GET", "/docs", "docsPage", "viewer", "This API, for reading", {}, {}, 200, page, {}});
+  all.push_back({"GET", "/trade", "tradePage", "viewer", "What accuracy costs: measured bakes", {}, {}, 200, page, {}});
 }
 
 std::vector<Endpoint> make_endpoints() {

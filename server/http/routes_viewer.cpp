@@ -51,7 +51,10 @@ Handler page(std::string_view path) {
 }  // namespace
 
 Handlers viewer_routes() {
-  return {{"galleryPage", page("index.html")}, {"viewerPage", page("view.html")}, {"docsPage", page("docs.html")}};
+  return {{"galleryPage", page("index.html")},
+          {"viewerPage", page("view.html")},
+          {"docsPage", page("docs.html")},
+          {"tradePage", page("trade.html")}};
 }
 
 Reply viewer_file(Request& request) {

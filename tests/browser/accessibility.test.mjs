@@ -38,6 +38,14 @@ const kPages = {
     wait: () => document.querySelectorAll('.operation').length > 0,
     act: (page) => page.locator('summary').first().click(),
   },
+  trade: {
+    path: '/trade',
+    wait: () => document.querySelectorAll('.trade-point').length > 0,
+    act: async (page) => {
+      await page.locator('summary').first().click();
+      await page.locator('.trade-point[tabindex="0"]').first().focus();
+    },
+  },
 };
 
 /// axe itself may not be injected as a script: the policy forbids it. Playwright evaluates it outside the policy.

@@ -226,8 +226,8 @@ export async function startMock({ port = 0, files = {} } = {}) {
         ? 'index.html'
         : /^\/view\/[^/]+$/.test(url.pathname)
           ? 'view.html'
-          : url.pathname === '/docs'
-            ? 'docs.html'
+          : ['/docs', '/trade'].includes(url.pathname)
+            ? `${url.pathname}.html`
             : url.pathname;
     void file(response, join(kDist, normalize(`/${page}`)));
   });

@@ -138,6 +138,13 @@ test('the docs page shows every operation of the real interface', async () => {
   assert.deepEqual(page.faults, []);
 });
 
+test('the trade page is served, with its rows built in', async () => {
+  const page = await openPage(browser, `${url}/trade`);
+  await until(page, () => document.querySelectorAll('.trade-point').length > 0);
+  assert.deepEqual(page.faults, []);
+  assert.deepEqual(await page.evaluate(() => window.violations), []);
+});
+
 test('a file that is no model is refused, or fails with a reason that the card shows', async () => {
   const page = await openPage(browser, url);
   await until(page, () => document.querySelector('#preset').options.length > 0);

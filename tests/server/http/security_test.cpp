@@ -107,7 +107,7 @@ TEST(Security, ANameThatIsNotOursIsMisdirectedWhenNamesAreGiven) {
 
 TEST(Security, S7PagesCarryTheirPolicyAndEveryReplyTheOtherFields) {
   RunningServer server;
-  for (const char* path : {"/", "/view/01JOB", "/docs"}) {
+  for (const char* path : {"/", "/view/01JOB", "/docs", "/trade"}) {
     RawReply page = server.get(path);
     EXPECT_EQ(page.status, 200) << path;
     EXPECT_EQ(

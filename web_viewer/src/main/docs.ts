@@ -204,7 +204,8 @@ function show(main: HTMLElement): void {
 
 async function start(): Promise<void> {
   const main = h('main', { class: 'docs' });
-  document.body.append(pageHeader('HTTP interface'), main);
+  const trade = h('a', { href: '/trade', class: 'text-link' }, 'Accuracy');
+  document.body.append(pageHeader('HTTP interface', trade), main);
   try {
     const answer = await fetch('/openapi.json');
     if (!answer.ok) throw new Error(`the server answered ${answer.status} for /openapi.json`);

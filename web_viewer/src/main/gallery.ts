@@ -143,7 +143,8 @@ function build(): void {
     more,
   );
   const docs = h('a', { href: '/docs', class: 'text-link' }, 'HTTP interface');
-  document.body.append(pageHeader('Baked light', docs), h('main', {}, new UploadPanel(show).element, jobs));
+  const trade = h('a', { href: '/trade', class: 'text-link' }, 'Accuracy');
+  document.body.append(pageHeader('Baked light', trade, docs), h('main', {}, new UploadPanel(show).element, jobs));
 }
 
 build();
