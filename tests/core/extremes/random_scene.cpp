@@ -73,7 +73,8 @@ void box(RandomPart& part, Dice& dice) {
 void sheet(RandomPart& part, Dice& dice) {
   const int n = 1 + dice.below(4);
   for (int i = 0; i < n * n; ++i) {
-    add_quad(part, {2.0 * (i % n) / n - 1, 0, 1 - 2.0 * (i / n) / n}, {2.0 / n, 0, 0}, {0, 0, -2.0 / n});
+    const int column = i % n, row = i / n;
+    add_quad(part, {2.0 * column / n - 1, 0, 1 - 2.0 * row / n}, {2.0 / n, 0, 0}, {0, 0, -2.0 / n});
   }
 }
 
