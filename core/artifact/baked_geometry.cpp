@@ -51,10 +51,12 @@ std::vector<float> gather(std::span<const std::uint32_t> vertices, const F& f) {
 
 float unit(float x) { return std::clamp(x, 0.0F, 1.0F); }
 
-/// Texture coordinates keep the step that `bits` give to the range [0, 1], however far they reach (up to 24 bits).
+/// Texture coordinates keep the step that `bits` give to the range [0, 1], however far they reach (up to 24 bits, and
+/// 1e30: far beyond where floats are whole numbers).
 VertexStream texcoord_stream(const std::vector<Vec2f>& uv, std::span<const std::uint32_t> vertices, int bits) {
-  VertexStream out{StreamKind::texcoord, 2, bits, {uv[vertices[0]].x, uv[vertices[0]].y}, 1, {}};
-  out.values = gather<2>(vertices, [&](auto v) { return std::array{uv[v].x, uv[v].y}; });
+  const auto near = [](float x) { return std::clamp(x, -1e30F, 1e30F); };
+  VertexStream out{StreamKind::texcoord, 2, bits, {near(uv[vertices[0]].x), near(uv[vertices[0]].y)}, 1, {}};
+  out.values = gather<2>(vertices, [&](auto v) { return std::array{near(uv[v].x), near(uv[v].y)}; });
   std::array<float, 2> high{out.origin[0], out.origin[1]};
   for (std::size_t i = 0; i < out.values.size(); ++i) {
     out.origin[i % 2] = std::min(out.origin[i % 2], out.values[i]);

@@ -5,21 +5,34 @@
 namespace kiln {
 namespace {
 
-float channel_value(const Transfer& transfer, std::size_t vertex, int channel, std::span<const Vec3f> light) {
-  const float* t = transfer.at(vertex, channel);
-  double sum = transfer.fixed ? t[transfer.slots() - 1] : 0.0;
-  for (std::size_t i = 0; i < light.size(); ++i)
-    sum += static_cast<double>(t[i]) * light[i][static_cast<std::size_t>(channel)];
-  return static_cast<float>(sum);
+/// Equation 1 with `start` for the lamps.
+Vec3f add_light(const Transfer& transfer, std::size_t vertex, std::span<const Vec3f> light, Vec3d start) {
+  EXPECTS(vertex < transfer.vertices());
+  EXPECTS(light.empty() || light.size() == static_cast<std::size_t>(sh_count(transfer.order)));
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float* t = transfer.at(vertex, static_cast<int>(c));
+    for (std::size_t i = 0; i < light.size(); ++i) start[c] += static_cast<double>(t[i]) * light[i][c];
+  }
+  return to_float(start);
+}
+
+Vec3d lamps_at(const Transfer& transfer, std::size_t vertex) {
+  if (!transfer.fixed || vertex >= transfer.vertices()) return {};
+  const int slot = transfer.slots() - 1;
+  return {transfer.at(vertex, 0)[slot], transfer.at(vertex, 1)[slot], transfer.at(vertex, 2)[slot]};
+}
+
+/// What a function of vertices is inside a triangle.
+template <class F>
+Vec3f interpolate(const TrianglePoint& point, const F& at) {
+  const auto& [a, b, c] = point.triangle;
+  return at(a) * (1 - point.u - point.v) + at(b) * point.u + at(c) * point.v;
 }
 
 }  // namespace
 
 Vec3f value_at(const Transfer& transfer, std::size_t vertex, std::span<const Vec3f> light) {
-  EXPECTS(vertex < transfer.vertices());
-  EXPECTS(light.empty() || light.size() == static_cast<std::size_t>(sh_count(transfer.order)));
-  return {channel_value(transfer, vertex, 0, light), channel_value(transfer, vertex, 1, light),
-          channel_value(transfer, vertex, 2, light)};
+  return add_light(transfer, vertex, light, lamps_at(transfer, vertex));
 }
 
 std::vector<Vec3f> values_of(const Transfer& transfer, std::span<const Vec3f> light) {
@@ -29,9 +42,11 @@ std::vector<Vec3f> values_of(const Transfer& transfer, std::span<const Vec3f> li
 }
 
 Vec3f value_at(const Transfer& transfer, const TrianglePoint& point, std::span<const Vec3f> light) {
-  const auto& [a, b, c] = point.triangle;
-  return value_at(transfer, a, light) * (1 - point.u - point.v) + value_at(transfer, b, light) * point.u +
-         value_at(transfer, c, light) * point.v;
+  return interpolate(point, [&](std::size_t vertex) { return value_at(transfer, vertex, light); });
+}
+
+Vec3f distant_value_at(const Transfer& transfer, const TrianglePoint& point, std::span<const Vec3f> light) {
+  return interpolate(point, [&](std::size_t vertex) { return add_light(transfer, vertex, light, {}); });
 }
 
 }  // namespace kiln

@@ -26,4 +26,7 @@ struct TrianglePoint {
 };
 Vec3f value_at(const Transfer&, const TrianglePoint&, std::span<const Vec3f> light);
 
+/// What distant light alone does there: equation 1 without the lamps' slot, which may be large enough to round it away.
+Vec3f distant_value_at(const Transfer&, const TrianglePoint&, std::span<const Vec3f> light);
+
 }  // namespace kiln

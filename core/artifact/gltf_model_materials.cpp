@@ -1,5 +1,6 @@
 #include <tiny_gltf.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/artifact/gltf_model.h"
@@ -92,6 +93,10 @@ Vec3f emission_of(const tinygltf::Material& material, const std::string& place, 
   if (strength) emission *= real_of(*strength, "emissiveStrength", 1);
   if (emission.x < 0 || emission.y < 0 || emission.z < 0) {
     findings.fail("emission_negative", "Emission must not be negative.", place + "/emissiveFactor");
+  }
+  constexpr float kBrightest = 1e30F;  // sums over many lamps still fit a float
+  if (std::max({emission.x, emission.y, emission.z}) > kBrightest) {
+    findings.fail("light_out_of_range", "Emission is above 1e30.", place + "/emissiveFactor");
   }
   return emission;
 }

@@ -46,14 +46,13 @@ Probe probe_surface(const Mesh& delivered, const Mesh& input, std::size_t points
 /// What the artefact shows under each lighting, the lamps last and alone: the fixed slot under darkness.
 std::vector<Vec3d> shown_values(const BakedScene& baked, const Probe& probe, const Lightings& lightings) {
   std::vector<Vec3d> out;
-  const auto lamps_at = [&](const TrianglePoint& p) { return to_double(value_at(baked.transfer, p, {})); };
   for (const auto& light : lightings.sh) {
     for (const TrianglePoint& p : probe.delivered) {
-      out.push_back(to_double(value_at(baked.transfer, p, light)) - lamps_at(p));
+      out.push_back(to_double(distant_value_at(baked.transfer, p, light)));
     }
   }
   if (baked.transfer.fixed) {
-    for (const TrianglePoint& p : probe.delivered) out.push_back(lamps_at(p));
+    for (const TrianglePoint& p : probe.delivered) out.push_back(to_double(value_at(baked.transfer, p, {})));
   }
   return out;
 }

@@ -5,10 +5,10 @@
 namespace kiln {
 namespace {
 
-Vec2f middle(const Vec2f& a, const Vec2f& b) { return {0.5F * (a.x + b.x), 0.5F * (a.y + b.y)}; }
-
+float middle(float a, float b) { return 0.5F * a + 0.5F * b; }  // no sum that could be too large
+Vec2f middle(const Vec2f& a, const Vec2f& b) { return {middle(a.x, b.x), middle(a.y, b.y)}; }
 Vec4f middle(const Vec4f& a, const Vec4f& b) {
-  return {0.5F * (a.x + b.x), 0.5F * (a.y + b.y), 0.5F * (a.z + b.z), 0.5F * (a.w + b.w)};
+  return {middle(a.x, b.x), middle(a.y, b.y), middle(a.z, b.z), middle(a.w, b.w)};
 }
 
 Vec4f middle_tangent(const Vec4f& a, const Vec4f& b) {

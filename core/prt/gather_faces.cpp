@@ -15,9 +15,15 @@ Vec3f lit_side(const Mesh& mesh, const Triangle& t, bool double_sided) {
   return double_sided && dot(face, shading) < 0 ? -face : face;
 }
 
-std::int8_t eight_bits(float x) { return static_cast<std::int8_t>(std::lrint(127 * x)); }
-
 }  // namespace
+
+std::uint32_t GatherFaces::pack(const Vec3f& normal) {
+  const float sum = std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z);
+  const Vec3f n = normal / sum;
+  const float folded = std::max(0.0F, -n.z);
+  const auto grid = [](float x) { return static_cast<std::uint32_t>(std::lrint(0.5F * kSteps * (x + 1))); };
+  return grid(n.x + std::copysign(folded, n.x)) | grid(n.y + std::copysign(folded, n.y)) << kBits;
+}
 
 GatherFaces::GatherFaces(const Scene& scene) {
   const Mesh& mesh = scene.mesh;
@@ -38,8 +44,7 @@ GatherFaces::GatherFaces(const Scene& scene) {
       grey_ = grey_ && plain_[part] && a.x == a.y && a.y == a.z;
     }
     const Vec3f n = lit_side(mesh, mesh.triangles[t], material.double_sided);
-    const int flags = (material.double_sided ? kDoubleSided : 0) | (plain_[part] ? kPlain : 0);
-    faces_.push_back({eight_bits(n.x), eight_bits(n.y), eight_bits(n.z), static_cast<std::uint8_t>(flags)});
+    faces_.push_back(pack(n) | (material.double_sided ? kDoubleSided : 0) | (plain_[part] ? kPlain : 0));
   }
 }
 

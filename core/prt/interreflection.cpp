@@ -165,8 +165,21 @@ class Solver {
       const std::span<const float> reflected = gatherer.result();
       for (std::size_t i = 0; i < reflected.size(); ++i) row[i] += reflected[i];
       fixed += gatherer.fixed();
+      limit(row);
     }
     store(next, v, row, fixed, pass + 1 < params_.bounces);
+  }
+
+  // Under a constant sky of 1 nothing is brighter than 1. Open sky and hits are counted with different rays, and direct
+  // light may be fitted (fit_vertices.h): a vector with more than there is shrinks to it, as a whole.
+  void limit(Row& row) const {
+    constexpr float kAll = 0.28209479F;  // Y(0,0)
+    for (std::size_t c = 0; c < static_cast<std::size_t>(out_.channels); ++c) {
+      float* t = row.data() + c * count();
+      if (t[0] <= kAll) continue;
+      const float share = kAll / t[0];
+      for (std::size_t i = 0; i < count(); ++i) t[i] *= share;
+    }
   }
 
   TransferPoint point_of(std::uint32_t v) const {

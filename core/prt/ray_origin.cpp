@@ -11,15 +11,19 @@
 namespace kiln {
 namespace {
 
-constexpr float kPull = 2e-6F;      // of the unit cube: about the lift of offset_origin; at half of it the tracer's
-                                    // rounding lets twice as many rays through the seams of a closed room
-constexpr float kSteepest = 0.25F;  // below this cosine between shading and face normal the face lends its own
+constexpr float kPull = 2e-6F;       // of the unit cube: about the lift of offset_origin; at half of it the tracer's
+                                     // rounding lets twice as many rays through the seams of a closed room
+constexpr float kSteepest = 0.25F;   // below this cosine between shading and face normal the face lends its own
+constexpr float kMostAside = 0.35F;  // of the lift: a third of the pull, which must win where a wall stands
 
-// The direction of the lift: the shading normal, bent away from a face that it nearly grazes.
+// The lift: along the shading normal, bent away from a face that it nearly grazes, and hardly along the face.
 Vec3f lift_direction(const TransferPoint& p) {
   const float cosine = dot(p.normal, p.face_normal);
-  if (std::abs(cosine) >= kSteepest) return p.normal;
-  return normalized(p.normal + p.face_normal * std::copysign(1.0F, cosine), p.normal);
+  const Vec3f bent = p.normal + p.face_normal * std::copysign(1.0F, cosine);
+  const Vec3f lift = std::abs(cosine) >= kSteepest ? p.normal : normalized(bent, p.normal);
+  const Vec3f up = p.face_normal * dot(lift, p.face_normal), aside = lift - up;
+  const float size = length(aside);
+  return size > kMostAside ? up + aside * (kMostAside / size) : lift;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 //  - rays towards a wall that meets the surface at the vertex hit it, they do not look through it;
 //  - rays below the horizon of a face are stopped by that face itself, as they are on the surface between vertices,
 //    so a shading normal that differs from the face's lets no light leak through;
+//  - what the lift moves along the face is less than the pull: a normal that leans towards a wall takes no ray outside;
 //  - the lift is no smaller than the pull, so that the tip of a smooth convex surface sees what the tip sees and has no
 //    dark rim. (Where nothing rises above the tangent plane no ray is traced at all.)
 // Both lengths are far below 1e-5 of the scene: no thin neighbour is skipped.

@@ -33,16 +33,36 @@ Coverage coverage_of(const Scene& scene, const Part& part) {
 struct Selection {
   std::vector<std::uint32_t> original;
   const Scene* scene = nullptr;
+  std::vector<std::uint8_t> first = {};  // of each triangle the corner that Embree has first
   std::uint32_t operator[](std::uint32_t primitive) const { return original.empty() ? primitive : original[primitive]; }
+
+  /// Embree's barycentrics as weights of the mesh's corners 1 and 2.
+  Vec2f barycentrics(std::uint32_t primitive, float u, float v) const {
+    const float w = std::max(0.0F, 1 - u - v);
+    return first[primitive] == 0 ? Vec2f{u, v} : first[primitive] == 1 ? Vec2f{w, u} : Vec2f{v, w};
+  }
 };
+
+/// The corner opposite to the longest edge. Embree takes a triangle's plane from its first corner and the two edges
+/// there: from two long edges of a needle it is so wrong that the needle stops rays that start above it.
+std::uint8_t steadiest_corner(const Mesh& mesh, const Triangle& t) {
+  const auto opposite = [&](std::size_t k) {
+    const Vec3f edge = mesh.position[t[(k + 1) % 3]] - mesh.position[t[(k + 2) % 3]];
+    return dot(edge, edge);
+  };
+  std::uint8_t best = 0;
+  for (const std::uint8_t k : {std::uint8_t{1}, std::uint8_t{2}}) best = opposite(k) > opposite(best) ? k : best;
+  return best;
+}
 
 void keep_covered(const RTCFilterFunctionNArguments* args) {
   const auto& selection = *static_cast<const Selection*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
-    const SurfacePoint point{.triangle = selection[RTCHitN_primID(args->hit, args->N, i)],
-                             .u = RTCHitN_u(args->hit, args->N, i),
-                             .v = RTCHitN_v(args->hit, args->N, i)};
+    const std::uint32_t primitive = RTCHitN_primID(args->hit, args->N, i);
+    const Vec2f at =
+        selection.barycentrics(primitive, RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
+    const SurfacePoint point{.triangle = selection[primitive], .u = at.x, .v = at.y};
     if (opacity_at(*selection.scene, point) < kOpaqueFrom) args->valid[i] = 0;
   }
 }
@@ -138,9 +158,6 @@ struct Tracer::Device {
   void build();
   std::size_t select();
   void add_geometry(unsigned id, std::size_t count);
-  std::uint32_t original(unsigned geometry, unsigned primitive) const {
-    return geometry == RTC_INVALID_GEOMETRY_ID ? kNoHit : selections[geometry][primitive];
-  }
 };
 
 /// Fills the selections; returns how many triangles stop every ray.
@@ -164,7 +181,12 @@ void Tracer::Device::add_geometry(unsigned id, std::size_t count) {
   auto* triangles = static_cast<Triangle*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Triangle), count));
   check_device(device);
-  for (std::uint32_t i = 0; i < count; ++i) triangles[i] = scene.mesh.triangles[selections[id][i]];
+  selections[id].first.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Triangle& t = scene.mesh.triangles[selections[id][i]];
+    const std::size_t k = selections[id].first[i] = steadiest_corner(scene.mesh, t);
+    triangles[i] = {t[k], t[(k + 1) % 3], t[(k + 2) % 3]};
+  }
   if (id == 1) {
     rtcSetGeometryUserData(geometry, &selections[1]);
     rtcSetGeometryIntersectFilterFunction(geometry, keep_covered);
@@ -228,10 +250,14 @@ void Tracer::closest16(const Rays16& rays, Hits16& hits, int count) const {
   RTCIntersectContext context = incoherent();
   rtcIntersect16(valid, device_->world, &context, &query);
   std::memcpy(hits.t.data(), query.ray.tfar, sizeof query.ray.tfar);
-  std::memcpy(hits.u.data(), query.hit.u, sizeof query.hit.u);
-  std::memcpy(hits.v.data(), query.hit.v, sizeof query.hit.v);
-  for (std::size_t i = 0; i < kPacket; ++i)
-    hits.triangle[i] = device_->original(query.hit.geomID[i], query.hit.primID[i]);
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    hits.triangle[i] = kNoHit;
+    if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    const Selection& selection = device_->selections[query.hit.geomID[i]];
+    const Vec2f at = selection.barycentrics(query.hit.primID[i], query.hit.u[i], query.hit.v[i]);
+    hits.triangle[i] = selection[query.hit.primID[i]];
+    hits.u[i] = at.x, hits.v[i] = at.y;
+  }
 }
 
 bool Tracer::occluded(const Vec3f& origin, const Vec3f& direction, float far) const {
@@ -248,11 +274,12 @@ Hit Tracer::closest(const Vec3f& origin, const Vec3f& direction, float far) cons
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context = incoherent();
   rtcIntersect1(device_->world, &context, &query);
-  const std::uint32_t triangle = device_->original(query.hit.geomID, query.hit.primID);
-  if (triangle == kNoHit) return {};
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  const Selection& selection = device_->selections[query.hit.geomID];
+  const std::uint32_t triangle = selection[query.hit.primID];
+  const Vec2f at = selection.barycentrics(query.hit.primID, query.hit.u, query.hit.v);
   const Vec3f face = area_vector(scene().mesh, scene().mesh.triangles[triangle]);
-  return {
-      .t = query.ray.tfar, .u = query.hit.u, .v = query.hit.v, .triangle = triangle, .back = dot(face, direction) > 0};
+  return {.t = query.ray.tfar, .u = at.x, .v = at.y, .triangle = triangle, .back = dot(face, direction) > 0};
 }
 
 }  // namespace kiln
