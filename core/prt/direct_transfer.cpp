@@ -40,7 +40,8 @@ struct DirectTransferBaker::State {
       return false;
     }
     const LocalFrame frame = local_frame(sets_, point.normal, params_.seed, item);
-    project(point, frame, sample(point, frame, rays), out);
+    Sum sum = sample(point, frame, rays);
+    project(point, frame, sum, out);
     return true;
   }
 
@@ -106,7 +107,7 @@ struct DirectTransferBaker::State {
   }
 
   // t = closed form - occluded / N, or open / N; the sum is turned from the local frame into world axes once.
-  void project(const TransferPoint& point, const LocalFrame& frame, Sum sum, float* out) const {
+  void project(const TransferPoint& point, const LocalFrame& frame, Sum& sum, float* out) const {
     const float weight = 1.0F / static_cast<float>(sum.rays);
     const int count = sh_count(params_.order);
     rotate_sh(params_.order, frame.basis, sum.row.data(), sum.row.data());

@@ -22,7 +22,7 @@ TEST(Compression, EverySlotKeepsItsPrecisionBesideOthersOfAnySize) {
     }
   }
   for (const int bits : {12, 16, 20}) {  // slot 0 needs 12
-    const BakedScene read = round_trip(written, {.coefficient_bits = bits});
+    const BakedScene read = round_trip(written, {.transfer = {.bits = bits}});
     const std::vector<std::uint32_t> original = original_vertices(read);
     for (std::size_t v = 0; v < original.size(); ++v) {
       for (std::size_t s = 1; s < slots; ++s) {

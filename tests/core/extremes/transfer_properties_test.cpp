@@ -75,7 +75,7 @@ TEST(TransferProperty, AConstantSkyGivesValuesFromNoneToOneAtEveryStage) {
     EXPECT_LE(solved.high, 1 + 2.5e-4F);
 
     baked.scene = std::move(*scene);
-    const Result<Bytes> file = write_baked_glb(baked, {.coefficient_bits = 8 + below(random, 9)});
+    const Result<Bytes> file = write_baked_glb(baked, {.transfer = {.bits = 8 + below(random, 9)}});
     ASSERT_TRUE(file) << file.error().message;
     const Result<BakedScene> decoded = read_baked_glb(*file);
     ASSERT_TRUE(decoded) << decoded.error().message;
