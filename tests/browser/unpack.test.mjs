@@ -7,7 +7,8 @@ import { decodeBaked, glbJson, valueAt } from './read_glb.mjs';
 import { fromViewer, load } from './sources.mjs';
 
 const { splitGlb, joinGlb } = await load('asset/glb.ts');
-const { unpack } = await load('asset/unpack.ts');
+const { readPacked, unpack: unpackRead } = await load('asset/unpack.ts');
+const unpack = (decoder, bytes) => unpackRead(decoder, readPacked(bytes));
 const { coefficientsOf, relight } = await load('light/transfer.ts');
 const draco = await fromViewer('draco3dgltf').createDecoderModule({});
 

@@ -47,7 +47,7 @@ export interface TransferPart {
 
 export interface RadianceTransfer extends RadianceTransferExtension {
   parts: TransferPart[];
-  bakedLight: Float32Array; // light[3 * i + channel]; empty when the bake had no environment
+  bakedLight: Float32Array; // see bakedLight()
   rows: Float32Array; // of the components, after their mean: (rank + 1) x channels x slots; empty: raw
 }
 
@@ -86,8 +86,12 @@ export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTr
       material: own.material ?? -1,
     });
   });
-  return { ...extension, parts, rows, bakedLight: Float32Array.from((extension.light?.coefficients ?? []).flat()) };
+  return { ...extension, parts, rows, bakedLight: bakedLight(extension) };
 }
+
+/// light[3 * i + channel] of the bake; empty when it had no environment.
+export const bakedLight = ({ light }: RadianceTransferExtension): Float32Array =>
+  Float32Array.from((light?.coefficients ?? []).flat());
 
 /// The mean and the rows of the components, from the bytes of their buffer view (little endian). Throws on another size.
 export function componentRows(e: RadianceTransferExtension, bytes: ArrayBuffer): Float32Array {

@@ -60,12 +60,23 @@ const kDraco = 'KHR_draco_mesh_compression';
 const [kUnsignedInt, kFloat] = [5125, 5126];
 const kComponents: Record<string, number> = { VEC2: 2, VEC3: 3, VEC4: 4 };
 
+/// Before anything is decoded.
+export interface Packed {
+  json: Json;
+  binary: Uint8Array<ArrayBuffer>;
+  extension: RadianceTransferExtension;
+}
+
 /// Throws, in words, on a file that is not as core/artifact/README.md says.
-export function unpack(draco: DracoModule, packed: ArrayBuffer): Unpacked {
-  const { json: parsed, binary } = splitGlb(packed);
-  const extension = readExtension(parsed);
+export function readPacked(file: ArrayBuffer): Packed {
+  const { json, binary } = splitGlb(file);
+  const extension = readExtension(json);
   if (!extension) throw new Error('this glTF carries no KILN_radiance_transfer');
-  const json = parsed as Json;
+  return { json: json as Json, binary, extension };
+}
+
+/// Uses up `packed`. Throws as readPacked does.
+export function unpack(draco: DracoModule, { json, binary, extension }: Packed): Unpacked {
   const form = formOf(extension, json, binary);
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();

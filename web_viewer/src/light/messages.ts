@@ -1,9 +1,11 @@
-// What the page and the light worker say to each other. Each request is answered by one reply with its `serial`; one of
-// `progress` is news and no answer yet.
+// What the page and the light worker say to each other. Each request is answered by one reply with its `serial`; `progress`
+// and `header` are news and no answer yet.
 
+import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import type { EquirectMap } from './equirect';
 
-/// Fetches a scene.glb, keeps its transfer vectors and hands over the rest. `progress` replies come while it arrives.
+/// Fetches a scene.glb, keeps its transfer vectors and hands over the rest. `progress` replies come while it arrives, one of
+/// `header` when it is there: decoding it takes longer than what the page can do meanwhile.
 export interface OpenRequest {
   kind: 'open';
   url: string;
@@ -68,6 +70,7 @@ export interface ProgressReply {
 export type Reply = { serial: number } & (
   | { opened: OpenReply }
   | { progress: ProgressReply }
+  | { header: RadianceTransferExtension }
   | { values: ValuesReply }
   | { projected: ProjectReply }
   | { failure: string }

@@ -1,9 +1,11 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
+import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import type { OpenReply, ProgressReply, ProjectReply, Reply, Request, ValuesReply } from './messages';
 
-type Progress = (news: ProgressReply) => void;
-type Answer = { resolve(reply: Reply): void; reject(error: Error): void; progress?: Progress };
+type Header = RadianceTransferExtension;
+type News = { progress?(news: ProgressReply): void; header?(header: Header): void };
+type Answer = { resolve(reply: Reply): void; reject(error: Error): void; news: News };
 
 export class Relighter {
   private readonly worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
@@ -19,8 +21,18 @@ export class Relighter {
   }
 
   /// The worker fetches the scene.glb at `url`: everything below is about that file then.
-  async open(url: string, progress: Progress): Promise<OpenReply> {
-    const reply = await this.ask({ kind: 'open', url }, [], progress);
+  open(url: string, progress: (news: ProgressReply) => void): { header: Promise<Header>; opened: Promise<OpenReply> } {
+    let tell: (header: Header) => void = () => {};
+    const opened = this.opened(url, { progress, header: (header) => tell(header) });
+    const header = new Promise<Header>((resolve, reject) => {
+      tell = resolve;
+      opened.catch(reject);
+    });
+    return { header, opened };
+  }
+
+  private async opened(url: string, news: News): Promise<OpenReply> {
+    const reply = await this.ask({ kind: 'open', url }, [], news);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
     return reply.opened;
   }
@@ -59,19 +71,20 @@ export class Relighter {
     return reply.values;
   }
 
-  private ask(request: Request, give: Float32Array[], progress?: Progress): Promise<Reply> {
+  private ask(request: Request, give: Float32Array[], news: News = {}): Promise<Reply> {
     const serial = ++this.serial;
     const transfer = [...new Set(give.map((array) => array.buffer))];
     return new Promise((resolve, reject) => {
       if (this.failure) return reject(this.failure);
-      this.waiting.set(serial, { resolve, reject, progress });
+      this.waiting.set(serial, { resolve, reject, news });
       this.worker.postMessage({ ...request, serial }, { transfer });
     });
   }
 
   private settle(reply: Reply): void {
     const answer = this.waiting.get(reply.serial);
-    if ('progress' in reply) return answer?.progress?.(reply.progress);
+    if ('progress' in reply) return answer?.news.progress?.(reply.progress);
+    if ('header' in reply) return answer?.news.header?.(reply.header);
     this.waiting.delete(reply.serial);
     if ('failure' in reply) answer?.reject(new Error(reply.failure));
     else answer?.resolve(reply);

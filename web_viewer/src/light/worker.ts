@@ -2,7 +2,7 @@
 
 import { download } from '../asset/download';
 import { loadDraco } from '../asset/draco_module';
-import { unpack, type BakedPrimitive } from '../asset/unpack';
+import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
 import {
@@ -27,15 +27,17 @@ let coefficients: Float32Array[] | null = null; // made when a false colour firs
 
 async function open({ url }: OpenRequest, serial: number): Promise<void> {
   let next = 0;
-  const packed = await download(url, (loaded, total) => {
+  const downloaded = await download(url, (loaded, total) => {
     if (performance.now() < next) return;
     next = performance.now() + kNewsEvery;
     send({ serial, progress: { loaded, total } });
   });
+  const packed = readPacked(downloaded);
+  send({ serial, header: packed.extension });
   const unpacked = unpack(await decoder, packed);
   const { file } = unpacked;
   [form, parts] = [unpacked.form, unpacked.baked];
-  send({ serial, opened: { file, bytes: packed.byteLength } }, [file]);
+  send({ serial, opened: { file, bytes: downloaded.byteLength } }, [file]);
 }
 
 /// Lamps count: they are there whatever the sky.

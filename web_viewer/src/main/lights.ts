@@ -1,5 +1,6 @@
 // The lights a viewer can choose from, as SH coefficients of one order, before rotation and intensity.
 
+import { bakedLight, type RadianceTransferExtension } from '../asset/kiln_reader';
 import { functionToEquirect, lightToEquirect, softened, type EquirectMap } from '../light/equirect';
 import { kSkies, projectSky, skyPicture, type Sky, type Sun } from '../light/skies';
 import { rotateAboutY, withOrder } from '../light/sh';
@@ -20,16 +21,17 @@ export class Lights {
   private map: EquirectMap | null = null;
   readonly choices: LightChoice[] = [];
 
-  /// `baked` is empty when the bake had no distant light.
-  constructor(
-    readonly order: number,
-    baked: Float32Array,
-    private readonly bakedName: string,
-  ) {
+  readonly order: number;
+  private readonly bakedName: string;
+
+  constructor(extension: RadianceTransferExtension) {
+    const { order, light } = extension;
+    const baked = bakedLight(extension);
+    [this.order, this.bakedName] = [order, light?.name ?? ''];
     this.known.set('baked', withOrder(baked, order));
     this.choices.push({
       id: 'baked',
-      label: baked.length > 0 ? `As baked: ${bakedName || 'environment'}` : 'As baked: no sky, lamps only',
+      label: baked.length > 0 ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
     });
     this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
   }

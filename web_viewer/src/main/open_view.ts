@@ -40,12 +40,12 @@ function checkShowable(job: Job): void {
 function openScene(url: string, relighter: Relighter, { overlay }: Page) {
   let hear = () => {};
   const heard = new Promise<void>((resolve) => (hear = resolve));
-  const opened = relighter.open(url, ({ loaded, total }) => {
+  const { header, opened } = relighter.open(url, ({ loaded, total }) => {
     hear();
     const [text, fraction] = total ? [`${bytes(loaded)} of ${bytes(total)}`, loaded / total] : [bytes(loaded), null];
     overlay.show(`Loading ${text}`, fraction);
   });
-  return { opened, begun: Promise.race([heard, opened]) };
+  return { header, opened, begun: Promise.race([heard, header]) };
 }
 
 async function open(page: Page): Promise<void> {
@@ -58,12 +58,12 @@ async function open(page: Page): Promise<void> {
   document.title = `${asked.label || page.id} – Kiln`;
   const job = await whenFinished(asked, page);
   checkShowable(job);
-  const { opened, begun } = openScene(artifactUrl(job, 'scene.glb'), relighter, page);
+  const { header, opened, begun } = openScene(artifactUrl(job, 'scene.glb'), relighter, page);
   await begun; // a worker cannot start while the next line blocks this thread
   const context = createContext(page.canvas);
   performance.mark('kiln:context');
   const { show } = await viewer;
-  await show(page, job, { context, relighter, opened });
+  await show(page, job, { context, relighter, header, opened });
 }
 
 async function start(): Promise<void> {

@@ -4,6 +4,7 @@ import type { Texture } from 'three';
 import type { Sun } from '../light/skies';
 import { skyTexture } from '../shaders/sky_texture';
 import type { Lights } from './lights';
+import type { ViewState } from './view_state';
 
 interface Kept {
   key: string;
@@ -14,7 +15,12 @@ export class SkyPictures {
   private shown: Kept | null = null;
   private reflected: Kept | null = null;
 
-  constructor(private readonly lights: Lights) {}
+  constructor(readonly lights: Lights) {}
+
+  /// Makes what the first picture will show.
+  prepare({ light, background }: Readonly<ViewState>): void {
+    if (background !== 'off') this.background(light, background === 'harmonics');
+  }
 
   background(light: string, harmonics: boolean): Texture {
     this.shown = this.keep(this.shown, `${light} ${harmonics}`, () =>

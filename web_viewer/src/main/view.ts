@@ -1,6 +1,7 @@
 // The picture of a finished job and everything round it. Loaded by open_view.ts while the light worker is at the file.
 
 import { artifact, artifactUrl, getReport, type Job, type Report } from '../asset/jobs';
+import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import { parseGltf } from '../asset/parse_gltf';
 import type { OpenReply } from '../light/messages';
 import type { Relighter } from '../light/relighter';
@@ -13,10 +14,12 @@ import { statistics } from '../ui/statistics';
 import { ViewPanel } from '../ui/view_panel';
 import { bindAddress } from './address';
 import { type KeyActions, listenToKeys, resetView } from './keyboard';
+import { Lights } from './lights';
 import type { Page } from './page';
 import { Probe } from './probe';
 import { acceptDrops, turnLightByDragging } from './pointer';
 import { saveScreenshot } from './screenshot';
+import { SkyPictures } from './sky_pictures';
 import { Stage } from './stage';
 import { Store } from './store';
 import { decodeState, type ViewState } from './view_state';
@@ -31,21 +34,24 @@ const kLegendTitles: Partial<Record<ViewState['mode'], string>> = {
 export interface Begun {
   context: WebGL2RenderingContext;
   relighter: Relighter; // with the job's scene.glb
+  header: Promise<RadianceTransferExtension>;
   opened: Promise<OpenReply>;
 }
 
 /// Resolves when the picture is shown and the page is complete.
-export async function show(page: Page, job: Job, { context, relighter, opened }: Begun): Promise<void> {
+export async function show(page: Page, job: Job, { context, relighter, header, opened }: Begun): Promise<void> {
   const stage = new Stage(page.canvas, context);
   page.onDispose(() => stage.dispose());
   performance.mark('kiln:stage');
   const report: Promise<Report | null> = artifact(job, 'report.json')
     ? getReport(job).catch(() => null)
     : Promise.resolve(null);
+  const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
+  const pictures = new SkyPictures(new Lights(await header));
+  pictures.prepare(state.get()); // while the worker decodes
   const asset = await parseGltf(await opened);
   performance.mark('kiln:decoded');
-  const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
-  const viewer = await Viewer.open(stage, asset, state, relighter);
+  const viewer = await Viewer.open(stage, asset, state, { relighter, pictures });
   page.onDispose(() => viewer.dispose());
   page.overlay.hide();
   performance.mark('kiln:first-picture');

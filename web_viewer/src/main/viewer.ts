@@ -7,8 +7,8 @@ import { SkyBackground } from '../shaders/sky_background';
 import { BakedModel } from './baked_model';
 import { Comparison } from './comparison';
 import { HeatMap, type HeatMapData } from './heat_map';
-import { Lights } from './lights';
-import { SkyPictures } from './sky_pictures';
+import type { Lights } from './lights';
+import type { SkyPictures } from './sky_pictures';
 import { kDefaultPose, type Stage } from './stage';
 import { Store } from './store';
 import type { ViewState } from './view_state';
@@ -23,7 +23,6 @@ const kOverexposed = 3 * kWellExposed;
 const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light';
 
 export class Viewer {
-  readonly lights: Lights;
   onLegend: (legend: Legend) => void = () => {};
   /// Told by how many stops the original is exposed less than the baked side; 0 when they are exposed alike.
   onBefore: (stops: number) => void = () => {};
@@ -38,7 +37,6 @@ export class Viewer {
   private heatMap: HeatMap | null = null;
   private comparison: Comparison | null = null;
   private comparisonAsked = false;
-  private readonly pictures: SkyPictures;
   private spare: Float32Array[] = [];
   private relighting = false;
   private relightAgain = false;
@@ -51,20 +49,23 @@ export class Viewer {
     readonly model: BakedModel,
     readonly state: Store<ViewState>,
     private readonly relighter: Relighter,
+    private readonly pictures: SkyPictures,
   ) {
-    const { transfer } = model;
-    this.lights = new Lights(transfer.order, transfer.bakedLight, transfer.light?.name ?? '');
-    this.pictures = new SkyPictures(this.lights);
     stage.scene.add(model.root, this.background.mesh);
     stage.setBounds(model.bounds);
     this.setPose();
     this.unsubscribe = state.subscribe((_state, changed) => this.apply(changed));
   }
 
-  /// Resolves when the first light is on the screen. The viewer owns asset and relighter from then on.
-  static async open(stage: Stage, asset: LoadedAsset, state: Store<ViewState>, relighter: Relighter): Promise<Viewer> {
+  /// Resolves when the first light is on the screen. The viewer owns asset, relighter and pictures from then on.
+  static async open(
+    stage: Stage,
+    asset: LoadedAsset,
+    state: Store<ViewState>,
+    { relighter, pictures }: { relighter: Relighter; pictures: SkyPictures },
+  ): Promise<Viewer> {
     const model = await BakedModel.create(asset);
-    const viewer = new Viewer(stage, asset, model, state, relighter);
+    const viewer = new Viewer(stage, asset, model, state, relighter, pictures);
     viewer.setLook();
     const lit = Promise.all([viewer.relightOnce(), viewer.measureLevel()]);
     model.setWhite(state.get().mode === 'light');
@@ -103,6 +104,10 @@ export class Viewer {
     if (has('compare')) void this.compare(state.compare);
     if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare', 'mode')) this.showSky();
     this.stage.requestDraw();
+  }
+
+  get lights(): Lights {
+    return this.pictures.lights;
   }
 
   /// At most one request is under way; while it is, only the newest light waits.
