@@ -46,9 +46,11 @@ std::string error_text(const json& error) {
 std::string prediction_text(const json& plan) {
   if (!plan.contains("prediction")) return {};
   const json& p = plan["prediction"];
-  return "predicted: " + human_seconds(number_of(p, "seconds")) + ", " + human_bytes(number_of(p, "memory_bytes")) +
-         " of memory, " + human_bytes(number_of(p, "artifact_bytes")) + " of result, " +
-         count(number_of(p, "triangles")) + " triangles\n";
+  const std::string of = text_of(p, "of");
+  return "predicted" + (of.empty() || of == "the bake" ? "" : " for " + of) + ": " +
+         human_seconds(number_of(p, "seconds")) + ", " + human_bytes(number_of(p, "memory_bytes")) + " of memory, " +
+         human_bytes(number_of(p, "artifact_bytes")) + " of result, " + count(number_of(p, "triangles")) +
+         " triangles\n";
 }
 
 std::vector<std::string> warnings_of(const json& document) {

@@ -167,7 +167,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
   }
   const Mesh surface = scene.mesh;
   std::optional<Pass> newest;
-  std::optional<Plan> next = passes.resume(parse_checkpoint(checkpoints.last), std::move(plan), scene, threads.count());
+  std::optional<Plan> next = passes.resume(parse_checkpoint(checkpoints.last), std::move(plan), scene);
   const double before = passes.all().empty() ? 0 : passes.all().back().elapsed_s;
   for (double done = kFirst; next; done += kShare * (kLast - done)) {
     scene.mesh = surface;
@@ -180,7 +180,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
     log.know_error(passes.all().back().relrmse);
     newest = std::move(pass);
     scene.mesh = surface;
-    next = passes.next(newest->plan, scene, threads.count());
+    next = passes.next(newest->plan, scene);
   }
   return std::move(*newest);
 }
@@ -240,7 +240,7 @@ Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   if (auto light = job_light(input); !light) return tl::make_unexpected(light.error());
   const Plan plan = make_plan(scene, input.recipe.steps.front(), effort_of(input.recipe), threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
-  return plan_report_json(plan, scene);
+  return plan_report_json(plan, scene, input.recipe.promise);
 }
 
 }  // namespace kiln

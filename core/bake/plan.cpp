@@ -5,16 +5,10 @@
 #include <cmath>
 
 #include "core/bake/bounce_tail.h"
-#include "core/prt/interreflection.h"
-#include "core/sphere/sh.h"
 #include "core/trace/tracer.h"
 
 namespace kiln {
 namespace {
-
-/// Measured on the machine of core/prt/README.md, one thread: million rays a second, and bytes a vertex.
-constexpr double kRaysPerSecond = 8e6;
-constexpr std::uint64_t kBytesPerTriangle = 160;  // mesh, hierarchy and hash tables
 
 bool emits(const Material& material) { return length(material.emission) > 0; }
 
@@ -42,12 +36,12 @@ void plan_order(Plan& plan, const PrtStep& step, const Effort& effort) {
          step.order ? kAsked : effort.reason + " keeps " + std::to_string(plan.order) + " bands of distant light");
 }
 
-void plan_bounces(Plan& plan, const Scene& scene, const PrtStep& step, const Effort& effort, Threads& threads) {
+void plan_bounces(Plan& plan, const Tracer& tracer, const PrtStep& step, const Effort& effort, Threads& threads) {
   if (step.bounces) {
     plan.bounces = *step.bounces;
     return decide(plan, "bounces", std::to_string(plan.bounces), kAsked);
   }
-  const BounceTail tail = measure_bounces(Tracer(scene, threads), plan.lamps, effort.tail, threads);
+  const BounceTail tail = measure_bounces(tracer, plan.lamps, effort.tail, threads);
   plan.bounces = tail.bounces;
   plan.tail_left = tail.left;
   decide(plan, "bounces", std::to_string(plan.bounces),
@@ -133,34 +127,18 @@ Effort first_effort(const Promise& promise) {
   return effort;
 }
 
-Prediction predict(const Plan& plan, const Scene& scene, int threads) {
-  Prediction out;
-  const std::uint64_t input_vertices = scene.mesh.position.size(), input = scene.mesh.triangles.size();
-  out.triangles = plan.split ? plan.subdivide.triangles : input;
-  out.vertices = input_vertices + (plan.split ? (out.triangles - input) : 0);
-  const auto slots = static_cast<std::uint64_t>(sh_count(plan.order)) + (plan.lamps ? 1 : 0);
-  out.memory_bytes =
-      out.vertices * (slots * 3 * 4 * 2 + 200) + (out.triangles + input) * kBytesPerTriangle + (64ULL << 20);
-  for (const Image& image : scene.images) out.memory_bytes += image.rgba.size() + image.encoded.size();
-  const std::uint64_t per_vertex =
-      static_cast<std::uint64_t>(plan.samples + (plan.lamps ? plan.lamp_samples : 0)) +
-      rays_per_vertex(Interreflection{.bounces = plan.bounces, .samples = plan.bounce_samples});
-  out.rays = out.vertices * per_vertex;
-  out.seconds = static_cast<double>(out.rays) / (kRaysPerSecond * std::max(1, threads)) + 0.2;
-  out.artifact_bytes = out.vertices * (slots * 3 * static_cast<std::uint64_t>(plan.raw_bits) / 16 + 8);
-  return out;
-}
-
 Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Threads& threads) {
   Plan plan;
   plan_order(plan, step, effort);
   plan_lamps(plan, scene);
-  plan_bounces(plan, scene, step, effort, threads);
+  const Tracer tracer(scene, threads);
+  plan_bounces(plan, tracer, step, effort, threads);
   plan_samples(plan, step, effort);
   plan_subdivision(plan, scene, step.subdivide, effort);
   plan_encoding(plan, step, effort);
   decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
-  plan.prediction = predict(plan, scene, threads.count());
+  plan.costs = measure_costs(tracer, plan, threads);
+  plan.prediction = predict(plan, scene);
   return plan;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/bake/forecast.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/prt/subdivide.h"
@@ -17,15 +18,6 @@ struct Decision {
   std::string decision;  // "order", "bounces", ...
   std::string value;     // "6"
   std::string reason;
-};
-
-/// Numbers known before any ray is traced. `vertices` is what the memory bound is taken from: a worst case.
-struct Prediction {
-  std::uint64_t triangles = 0, vertices = 0;
-  std::uint64_t memory_bytes = 0;
-  std::uint64_t rays = 0;
-  double seconds = 0;
-  std::uint64_t artifact_bytes = 0;
 };
 
 struct Plan {
@@ -43,6 +35,7 @@ struct Plan {
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
   std::vector<Decision> decisions;
+  PointCosts costs;
   Prediction prediction;
 };
 
@@ -62,10 +55,7 @@ Effort effort_of(Quality);
 /// Of the first, coarse pass towards a promise (progressive.h).
 Effort first_effort(const Promise&);
 
-/// Traces a few thousand paths to see how many reflections matter, unless the step says.
+/// Traces a few thousand paths to see how many reflections matter, unless the step says, and a pilot (forecast.h).
 Plan make_plan(const Scene&, const PrtStep&, const Effort&, Threads&);
-
-/// Time, memory and bytes of a plan.
-Prediction predict(const Plan&, const Scene&, int threads);
 
 }  // namespace kiln

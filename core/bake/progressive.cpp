@@ -117,7 +117,7 @@ Passes::Growth Passes::within(double most) const {
   return towards(cheap);
 }
 
-std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& scene, int threads) {
+std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& scene) {
   Plan plan = last;
   const auto more = [&](int samples) {
     return static_cast<int>(std::min(kMaxRays, std::ceil(samples * growth.samples / 16) * 16));
@@ -133,7 +133,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
     plan.subdivide.triangles = static_cast<std::uint64_t>(std::min(triangles, 5e7));
     plan.split = plan.subdivide.triangles > scene.mesh.triangles.size();
   }
-  plan.prediction = predict(plan, scene, threads);
+  plan.prediction = predict(plan, scene);
   if (plan.prediction.memory_bytes > limits_.memory_mb << 20) {
     return end(Ending::floor,
                "reached " + percent(all_.back().high) + "; more triangles would need more than /limits/memory_mb");
@@ -148,7 +148,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
 }
 
 /// Truncation falls about as order^-1.5 under skies with a sun: an order is tried only if ten bands may do.
-std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, int threads) {
+std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene) {
   constexpr int kStep = 2;
   const PassRecord& now = all_.back();
   const double at_ten = *now.own_relrmse * std::pow(static_cast<double>(now.order) / kMaxShOrder, 1.5);
@@ -161,7 +161,7 @@ std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, i
   if (time_growth() < kLeastGrowth) return end(Ending::time_spent, "the time ended before a higher order was baked");
   Plan plan = last;
   plan.order = std::min(kMaxShOrder, now.order + kStep);
-  plan.prediction = predict(plan, scene, threads);
+  plan.prediction = predict(plan, scene);
   for (Decision& d : plan.decisions) {
     if (d.decision == "order")
       d = {"order", std::to_string(plan.order), "fewer bands cannot hold the job's own light to the target"};
@@ -169,12 +169,12 @@ std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene, i
   return plan;
 }
 
-std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, int threads) {
+std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
   const PassRecord& now = all_.back();
   if (transport_met()) {
     if (!own_light_bound() || *now.own_high <= *promise_.target_error)
       return end(Ending::target_met, "reached " + percent(now.high) + " of " + percent(*promise_.target_error));
-    return higher_order(last, scene, threads);
+    return higher_order(last, scene);
   }
   const double affordable = time_growth();
   if (affordable < kLeastGrowth) {
@@ -206,14 +206,14 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene, int threa
                      (free_samples ? "/steps/0/subdivide" : "/steps/0/samples"));
     }
   }
-  return grown(last, growth, scene, threads);
+  return grown(last, growth, scene);
 }
 
-Plan Passes::resume(const std::vector<PassRecord>& known, Plan plan, const Scene& scene, int threads) {
+Plan Passes::resume(const std::vector<PassRecord>& known, Plan plan, const Scene& scene) {
   for (const PassRecord& record : known) {
     if (record.order != plan.order || record.samples != plan.samples) break;  // of another input after all
     add(record);
-    auto following = next(plan, scene, threads);
+    auto following = next(plan, scene);
     if (!following) {  // the bake was cut off between its last pass and its end: that pass is needed again
       all_.pop_back();
       break;

@@ -49,10 +49,10 @@ class Passes {
 
   /// The plan of the next pass; nothing when the promise is kept or cannot be, as outlook() then says.
   /// `last` is the plan of the newest pass, `scene` has the input's mesh. Follows from the records alone.
-  std::optional<Plan> next(const Plan& last, const Scene& scene, int threads);
+  std::optional<Plan> next(const Plan& last, const Scene& scene);
 
   /// Takes up the passes that an earlier bake of the same input recorded; the plan of the one to go on with.
-  Plan resume(const std::vector<PassRecord>& known, Plan first, const Scene& scene, int threads);
+  Plan resume(const std::vector<PassRecord>& known, Plan first, const Scene& scene);
 
   const Outlook& outlook() const { return outlook_; }
   bool kept() const { return outlook_.ending != Outlook::Ending::floor; }
@@ -71,8 +71,8 @@ class Passes {
   double interpolation_power() const;
   Growth towards(double wanted) const;
   Growth within(double most) const;
-  std::optional<Plan> higher_order(const Plan& last, const Scene&, int threads);
-  std::optional<Plan> grown(const Plan& last, Growth, const Scene&, int threads);
+  std::optional<Plan> higher_order(const Plan& last, const Scene&);
+  std::optional<Plan> grown(const Plan& last, Growth, const Scene&);
 
   Promise promise_;
   PrtStep step_;

@@ -96,6 +96,11 @@ ordered_json parameters_object(const Plan& plan) {
           {"compression", plan.compression}};
 }
 
+ordered_json prediction_object(const Prediction& p) {
+  return {{"triangles", p.triangles}, {"vertices", p.vertices},         {"rays", p.rays},
+          {"seconds", p.seconds},     {"memory_bytes", p.memory_bytes}, {"artifact_bytes", p.artifact_bytes}};
+}
+
 ordered_json sources_object(const ErrorSources& s) {
   ordered_json out = {{"noise", s.noise},
                       {"interpolation", s.interpolation},
@@ -146,6 +151,7 @@ std::string report_json(const ReportInput& in) {
                       {"scene", scene_object(in)},
                       {"plan", plan_list(in.plan)},
                       {"parameters", parameters_object(in.plan)},
+                      {"prediction", prediction_object(in.plan.prediction)},
                       {"recipe", ordered_json::parse(recipe_json(in.recipe))},
                       {"stages", stage_list(in.log)},
                       {"seconds", in.log.seconds()},
@@ -159,17 +165,14 @@ std::string report_json(const ReportInput& in) {
   return text_of(out);
 }
 
-std::string plan_report_json(const Plan& plan, const Scene& scene) {
-  const Prediction& p = plan.prediction;
+std::string plan_report_json(const Plan& plan, const Scene& scene, const Promise& promise) {
+  ordered_json prediction = prediction_object(plan.prediction);
+  prediction["of"] = promise.time_budget_s ? "the time budget" : promise ? "the first pass" : "the bake";
+  if (promise.time_budget_s)
+    prediction["seconds"] = std::max(*promise.time_budget_s, plan.prediction.seconds);  // one pass there is in any case
   return text_of({{"plan", plan_list(plan)},
                   {"parameters", parameters_object(plan)},
-                  {"prediction",
-                   {{"triangles", p.triangles},
-                    {"vertices", p.vertices},
-                    {"rays", p.rays},
-                    {"seconds", p.seconds},
-                    {"memory_bytes", p.memory_bytes},
-                    {"artifact_bytes", p.artifact_bytes}}},
+                  {"prediction", prediction},
                   {"warnings", warning_list(scene)}});
 }
 

@@ -31,6 +31,6 @@ struct ReportInput {
 std::string report_json(const ReportInput&);
 
 /// The plan alone, for POST /v1/plan and `kiln plan`.
-std::string plan_report_json(const Plan&, const Scene&);
+std::string plan_report_json(const Plan&, const Scene&, const Promise&);
 
 }  // namespace kiln

@@ -42,7 +42,7 @@ class DirectSource {
         .hidden = hidden_test(tracer_),
         .rough =
             [this](std::span<const TransferPoint> batch) {
-              return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRough));
+              return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));
             }};
     if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
     return s;
@@ -74,9 +74,8 @@ class DirectSource {
   std::uint64_t points = 0;  // asked for so far
 
  private:
-  static constexpr int kRough = 4;  // fewer rays for points that only tell where to split
   static DirectTransfer rough(DirectTransfer sky) {
-    sky.samples = std::max(16, sky.samples / kRough);
+    sky.samples = std::max(16, sky.samples / kRoughRays);
     return sky;
   }
   static constexpr float kOpenConstantBand = 0.2820948F;  // t_0 of an unoccluded point: Y(0,0)
@@ -163,24 +162,6 @@ std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::ui
   return out;
 }
 
-/// How the rays for distant light are spent: each point to the noise of the plan, relative to the mean light of about a
-/// thousand vertices. Interpolation halves the variance of what vertices have.
-DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
-                        std::uint64_t seed, Threads& threads) {
-  constexpr int kPilot = 64;
-  DirectTransfer out{.order = plan.order, .samples = plan.samples, .seed = seed};
-  if (!(plan.noise > 0)) return out;
-  const std::vector<TransferPoint> all = vertex_points(tracer.scene().mesh);
-  std::vector<TransferPoint> some;
-  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
-  double mean = 0;
-  for (const float t : bake_direct_transfer(tracer, some, {.order = 1, .samples = kPilot, .seed = seed}, threads))
-    mean += 2 * std::sqrt(M_PI) * t / static_cast<double>(some.size());
-  out.tolerance = static_cast<float>(std::sqrt(2.0) * plan.noise * std::max(mean, 0.01));
-  for (const double p : band_power) out.band_power.push_back(static_cast<float>(p));
-  return out;
-}
-
 /// Direct light in two independent draws: the second minus the first, shaped as Probes.
 std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPoint>& points, const Plan& plan,
                               const DirectTransfer& rays, Threads& threads) {
@@ -214,6 +195,23 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 }
 
 }  // namespace
+
+DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
+                        std::uint64_t seed, Threads& threads) {
+  constexpr int kPilot = 64;
+  DirectTransfer out{.order = plan.order, .samples = plan.samples, .seed = seed};
+  if (!(plan.noise > 0)) return out;
+  const std::vector<TransferPoint> all = vertex_points(tracer.scene().mesh);
+  std::vector<TransferPoint> some;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
+  double mean = 0;
+  for (const float t : bake_direct_transfer(tracer, some, {.order = 1, .samples = kPilot, .seed = seed}, threads))
+    mean += 2 * std::sqrt(M_PI) * t / static_cast<double>(some.size());
+  // Interpolation halves the variance of what vertices have.
+  out.tolerance = static_cast<float>(std::sqrt(2.0) * plan.noise * std::max(mean, 0.01));
+  for (const double p : band_power) out.band_power.push_back(static_cast<float>(p));
+  return out;
+}
 
 Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& band_power, std::uint64_t seed,
                           BakeLog& log, Threads& threads) {

@@ -7,8 +7,10 @@
 #include "core/bake/bake_log.h"
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
+#include "core/prt/direct_transfer.h"
 #include "core/prt/transfer.h"
 #include "core/scene/scene.h"
+#include "core/trace/tracer.h"
 
 namespace kiln {
 
@@ -22,6 +24,13 @@ struct Transport {
   Transfer transfer;  // of scene.mesh's vertices
   Probes noise;       // a second, independent draw of the same samples minus the first
 };
+
+inline constexpr int kRoughRays = 4;  // so many times fewer for points that only tell where to split
+
+/// How the rays for distant light are spent: each point to the noise of the plan, relative to the mean light of about a
+/// thousand vertices.
+DirectTransfer sky_rays(const Tracer&, const Plan&, const std::vector<double>& band_power, std::uint64_t seed,
+                        Threads&);
 
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.

@@ -133,7 +133,7 @@ Plan next_after(const PassRecord& pass) {
   Plan plan;
   plan.samples = pass.samples;
   plan.subdivide.triangles = pass.triangles;
-  return *passes.next(plan, Scene{}, 1);
+  return *passes.next(plan, Scene{});
 }
 
 TEST(Promise, TheNextPassSpendsOnTheLargestSource) {
@@ -148,7 +148,7 @@ TEST(Promise, TheNextPassSpendsOnTheLargestSource) {
 TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
   Passes passes({.target_error = 0.02}, {.order = 6}, {});
   passes.add(pass_with(0.01, 0.01));
-  EXPECT_FALSE(passes.next({}, Scene{}, 1));
+  EXPECT_FALSE(passes.next({}, Scene{}));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::target_met);
   EXPECT_TRUE(passes.kept());
 }
@@ -165,7 +165,7 @@ TEST(Promise, TheCostOfRaysIsLearntFromTwoPasses) {
   passes.add(second);
   Plan plan;
   plan.samples = second.samples;
-  const auto next = passes.next(plan, Scene{}, 1);
+  const auto next = passes.next(plan, Scene{});
   ASSERT_TRUE(next);
   // a + 16 b = .5 and a + 64 b = 1: b = 1 / 96, a = 1 / 3, and 2.7 s are 227 rays; 173 by rays alone.
   EXPECT_GT(next->samples, 192);
@@ -177,7 +177,7 @@ TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
   PassRecord pass = pass_with(0.05, 0.05);
   pass.elapsed_s = 8;
   passes.add(pass);
-  EXPECT_FALSE(passes.next({}, Scene{}, 1));
+  EXPECT_FALSE(passes.next({}, Scene{}));
   EXPECT_FALSE(passes.kept());
   EXPECT_NE(passes.outlook().reason.find("/limits/wall_s"), std::string::npos);
 }
@@ -226,7 +226,7 @@ TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
     pass.rays = 1'000'000ULL << (2 * i);
     passes.add(pass);
   }
-  EXPECT_FALSE(passes.next({}, Scene{}, 1));
+  EXPECT_FALSE(passes.next({}, Scene{}));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::floor);
 }
 

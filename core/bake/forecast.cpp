@@ -1,0 +1,162 @@
+#include "core/bake/forecast.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "core/bake/lightings.h"
+#include "core/bake/plan.h"
+#include "core/bake/surface_samples.h"
+#include "core/bake/transport.h"
+#include "core/prt/direct_transfer.h"
+#include "core/prt/interreflection.h"
+#include "core/sphere/sh.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+constexpr std::size_t kPoints = 256, kRuns = 8, kLong = 128;
+constexpr std::size_t kLarge = 4096;           // vertices
+constexpr std::uint64_t kSeed = 0x70696c6f74;  // never the bake's own
+
+std::vector<TransferPoint> pilot_points(const Scene& scene) {
+  std::vector<TransferPoint> out;
+  for (const SurfaceSample& s : sample_surface(scene.mesh, kPoints, kSeed)) {
+    const SurfacePoint p = surface_point(scene, s.triangle, s.u, s.v);
+    out.push_back({p.position, p.normal, p.position, p.geometric_normal});
+  }
+  return out;
+}
+
+/// As subdivision asks: neighbours together. Points far from each other would find nothing of a large mesh in the
+/// cache.
+std::vector<TransferPoint> neighbours(const Mesh& mesh) {
+  std::vector<TransferPoint> out;
+  for (std::size_t run = 0; run < kRuns; ++run) {
+    const std::size_t first = run * (mesh.position.size() - kLong) / kRuns;
+    for (std::size_t i = 0; i < kLong; ++i)
+      out.push_back(vertex_point(mesh, static_cast<std::uint32_t>(first + i), kNoFace));
+  }
+  return out;
+}
+
+template <class Work>
+double seconds_of(Work&& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Counts of the refined mesh, from those of the input.
+struct Sizes {
+  double triangles, vertices, edges;
+};
+
+Sizes sizes_of(const Plan& plan, const Mesh& input) {
+  const auto t = static_cast<double>(input.triangles.size()), v = static_cast<double>(input.position.size());
+  const bool open = plan.costs.sky_rays == 0 && plan.costs.lamp_rays == 0;  // light changes nowhere
+  if (!plan.split || open) return {t, v, 0};
+  const auto triangles = static_cast<double>(plan.subdivide.triangles);
+  const double boundary = std::clamp(2 * v - t, 0.0, 3 * t) * std::sqrt(triangles / std::max(t, 1.0));
+  return {triangles, std::max(v, (triangles + boundary) / 2), (3 * triangles + boundary) / 2};
+}
+
+/// Where light is asked for while the mesh is split.
+struct Asked {
+  double exact, rough;
+};
+
+Asked asked_of(const Sizes& sizes) {
+  if (sizes.edges == 0) return {sizes.vertices, 0};
+  return {sizes.vertices + sizes.edges, sizes.triangles};
+}
+
+/// Rays of the rough points over those of the exact ones.
+double rough_share(const Plan& plan, double exact_rays) {
+  const double most = static_cast<double>(plan.samples) / kRoughRays;
+  return exact_rays > most ? most / exact_rays : 1;
+}
+
+// Fitted on the demo scenes, bunny, Cornell box and dungeon at draft and standard (core/bake/README.md).
+constexpr double kReflectedPrice =
+    3;  // of a closest hit with its surface, against a shadow ray and its share of projection
+
+double stored_bytes_of_vertex(const Plan& plan, double slots) {
+  constexpr double kFixed = 3, kSeesNoSky = 0.005;
+  const double lamps = plan.lamps ? kFixed : 0;
+  if (plan.costs.sky_light < kSeesNoSky) return lamps;
+  if (plan.encoding.form == PrtStep::Encoding::Form::raw) return slots * 3 * plan.raw_bits / 8 * 0.65;
+  return 0.62 * slots + lamps;
+}
+
+}  // namespace
+
+PointCosts measure_costs(const Tracer& tracer, const Plan& plan, Threads& threads) {
+  PointCosts out{.samples = plan.samples};
+  const std::vector<TransferPoint> points = pilot_points(tracer.scene());
+  if (points.empty()) return out;
+  const auto n = static_cast<double>(points.size());
+  const DirectTransfer rays = sky_rays(tracer, plan, band_power(plan.order, {}), kSeed, threads);
+  const DirectTransferBaker sky(tracer, rays);
+  TransferStats stats;
+  std::vector<float> values;
+  out.sky_seconds = seconds_of([&] { values = sky.bake(points, threads, &stats); }) / n;
+  out.sky_rays = static_cast<double>(stats.rays) / n;
+  if (tracer.scene().mesh.position.size() >= kLarge) {
+    const std::vector<TransferPoint> near = neighbours(tracer.scene().mesh);
+    sky.bake(near, threads, nullptr);  // once to warm the cache
+    stats = {};
+    const double seconds = seconds_of([&] { sky.bake(near, threads, &stats); });
+    if (stats.rays > 0) out.sky_seconds = out.sky_rays * seconds / static_cast<double>(stats.rays);
+  }
+  for (std::size_t p = 0; p < points.size(); ++p)
+    out.sky_light += 2 * std::sqrt(M_PI) * values[p * static_cast<std::size_t>(sh_count(plan.order))] / n;
+  if (!plan.lamps) return out;
+  stats = {};
+  const FixedDirect lamps{.samples = plan.lamp_samples, .seed = kSeed};
+  out.lamp_seconds = seconds_of([&] { bake_fixed_direct(tracer, points, lamps, threads, &stats); }) / n;
+  out.lamp_rays = static_cast<double>(stats.rays) / n;
+  return out;
+}
+
+Prediction predict(const Plan& plan, const Scene& scene) {
+  const Sizes sizes = sizes_of(plan, scene.mesh);
+  const Asked asked = asked_of(sizes);
+  const double slots = sh_count(plan.order) + (plan.lamps ? 1 : 0);
+  const PointCosts& costs = plan.costs;
+  const double more = static_cast<double>(plan.samples) / costs.samples;  // a later pass than the one that was measured
+  const double sky = asked.exact + asked.rough * rough_share(plan, costs.sky_rays * more);
+  const double lamp = asked.exact + asked.rough / kRoughRays;
+  const double reflected =
+      sizes.vertices *
+      static_cast<double>(rays_per_vertex(Interreflection{.bounces = plan.bounces, .samples = plan.bounce_samples}));
+
+  const double sky_rays = sky * costs.sky_rays * more, lamp_rays = lamp * costs.lamp_rays * more;
+  const double price = costs.sky_rays > 0 ? costs.sky_seconds / costs.sky_rays : 0;
+  const double traced =
+      (sky * costs.sky_seconds + lamp * costs.lamp_seconds) * more + reflected * kReflectedPrice * price;
+  const double splitting = plan.split ? 1.4e-5 * sizes.triangles : 0;
+  const double writing = sizes.vertices * (5e-6 + 4.5e-7 * slots);
+  const double certificate = 0.12 + 0.04 * traced;
+
+  double pixels = 0, files = 0;
+  for (const Image& image : scene.images) {
+    pixels += static_cast<double>(image.rgba.size());
+    files += static_cast<double>(image.encoded.size());
+  }
+  const double input_vertices = static_cast<double>(scene.mesh.position.size());
+  Prediction out;
+  out.triangles = static_cast<std::uint64_t>(sizes.triangles);
+  out.vertices = static_cast<std::uint64_t>(sizes.vertices);
+  out.rays = static_cast<std::uint64_t>(sky_rays + lamp_rays + reflected);
+  out.seconds = 0.05 + traced + splitting + writing + certificate;
+  out.memory_bytes = static_cast<std::uint64_t>(24e6 + sizes.vertices * (620 + 40 * slots) + 2 * pixels + 2 * files);
+  out.artifact_bytes = static_cast<std::uint64_t>(2000 + 2500 * static_cast<double>(scene.parts.size()) + files +
+                                                  4.5 * (sizes.vertices + input_vertices) +
+                                                  sizes.vertices * stored_bytes_of_vertex(plan, slots));
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,94 @@
+// How far the plan's predictions are off. Bakes scenes under the clear sky, each in a process of its own.
+//   kiln_forecast [--quality draft|standard|final] [SCENE.glb ...]     the two demo scenes when none is named
+// One JSON line a bake, predicted / measured of each figure, then the share of bakes within a factor 1.5. Asserts
+// nothing.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client_cli/models.h"
+#include "core/bake/bake.h"
+#include "core/bake/demo_scene.h"
+#include "tests/bench/trade/child.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kGoal = 1.5;
+
+Result<std::string> report_of(const SceneFiles& files, const std::string& quality) {
+  const ordered_json recipe = {{"environment", {{"builtin", "clear"}}}, {"quality", quality}};
+  const BakeInput input{files, *parse_recipe(recipe.dump()), {}, {}};
+  Threads threads;
+  KILN_TRY(output, bake(input, {}, threads));
+  for (const auto& file : output.files) {
+    if (file.name == "report.json") return std::string(file.bytes.begin(), file.bytes.end());
+  }
+  return fault("no_report", "the bake gave no report");
+}
+
+ordered_json ratios(const ordered_json& report) {
+  const ordered_json &predicted = report["prediction"], &result = report["result"];
+  const std::vector<std::pair<const char*, double>> measured = {
+      {"seconds", report["seconds"]},      {"memory_bytes", report["peak_memory_bytes"]},
+      {"artifact_bytes", result["bytes"]}, {"rays", report["rays"]},
+      {"vertices", result["vertices"]},    {"triangles", result["triangles"]}};
+  ordered_json out;
+  for (const auto& [name, value] : measured) out[name] = value > 0 ? predicted[name].get<double>() / value : 1.0;
+  return out;
+}
+
+int run(int count, char** words) {
+  std::string quality = "standard";
+  std::vector<SceneFiles> scenes;
+  for (int i = 1; i < count; ++i) {
+    const std::string word = words[i];
+    if (word == "--quality" && i + 1 < count) {
+      quality = words[++i];
+      continue;
+    }
+    auto files = load_files(word);
+    if (!files) {
+      std::fprintf(stderr, "%s: %s\n", word.c_str(), files.error().problem.detail.c_str());
+      return 1;
+    }
+    scenes.push_back(std::move(*files));
+  }
+  if (scenes.empty()) {
+    for (const std::string& name : demo_scene_names()) scenes.push_back({.name = name, .main = *demo_scene(name)});
+  }
+  std::map<std::string, int> good;
+  int bakes = 0;
+  for (const SceneFiles& files : scenes) {
+    const auto text = trade::in_child([&] { return report_of(files, quality); });
+    if (!text) {
+      std::printf("%s\n", ordered_json{{"scene", files.name}, {"fault", text.error().code}}.dump().c_str());
+      continue;
+    }
+    const ordered_json report = ordered_json::parse(*text), off = ratios(report);
+    ordered_json line = {{"scene", files.name}, {"quality", quality}, {"measured_seconds", report["seconds"]}};
+    line.update(off);
+    std::printf("%s\n", line.dump().c_str());
+    std::fflush(stdout);
+    ++bakes;
+    for (const auto& [name, ratio] : off.items())
+      good[name] += std::abs(std::log(ratio.get<double>())) <= std::log(kGoal);
+  }
+  ordered_json summary = {{"bakes", bakes}, {"within", kGoal}};
+  for (const auto& [name, number] : good) summary[name] = number;
+  std::printf("%s\n", summary.dump().c_str());
+  return 0;
+}
+
+}  // namespace
+}  // namespace kiln
+
+int main(int count, char** words) { return kiln::run(count, words); }

@@ -1,0 +1,5 @@
+if(TARGET kiln_bake AND TARGET kiln_client AND TARGET kiln_trade_parts)
+  add_executable(kiln_forecast forecast.cpp)
+  kiln_flags(kiln_forecast)
+  target_link_libraries(kiln_forecast PRIVATE kiln_trade_parts kiln_client kiln_bake nlohmann_json::nlohmann_json)
+endif()
