@@ -243,15 +243,19 @@ struct Spending {
 /// A function of the scene and the bake's rays, never of time, so that reports repeat.
 Spending plan_spending(const ErrorStats& pilot, double rays_per_path, const CertificateOptions& options) {
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
-  constexpr double kTenthSecond = 192 * kFewestPoints, kSecond = 8 * kTenthSecond, kMostPaths = 4096 * kFewestPoints;
+  constexpr double kTenthSecond = 128 * kFewestPoints, kSecond = 1536 * kFewestPoints,
+                   kMostPaths = 4096 * kFewestPoints;
   constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
+  // Rare gross errors, like a strip of floor under a column, are a thousandth of the surface and most of the error:
+  // where a promise hangs on it, enough points to meet some.
+  const double fewest = options.thorough ? 4.0 * kFewestPoints : 1.0 * kFewestPoints;
   const double paths = std::clamp(kShare * static_cast<double>(options.bake_rays) / (kSingleRay * rays_per_path),
                                   options.thorough ? kSecond : kTenthSecond, kMostPaths);
   const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance
   const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
   Spending out;
-  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / kFewestPoints));
-  out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, double{kFewestPoints}, double{kMostPoints}));
+  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / fewest));
+  out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, fewest, double{kMostPoints}));
   return out;
 }
 
