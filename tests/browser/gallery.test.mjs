@@ -37,15 +37,17 @@ test('all jobs are shown, newest first, with status, time, error and picture', (
     const order = await page.$$eval('.card', (cards) => cards.map((c) => c.dataset.job));
     assert.deepEqual(order, [...mock.jobs.keys()].reverse());
     assert.match(await card(page, 'failed').innerText(), /Failed[^]*element 812: index 70001 is not below/);
-    assert.match(await card(page, 'done').innerText(), /Done[^]*took 24 s · 102 kB/);
+    const said = (i) => /Done[^]*took 24 s · 102 kB · error 1.2\s%/.test(document.querySelector(`[data-job="${i}"]`).innerText);
+    await until(page, said, jobId('done')); // the error is read from the job's report
     await until(page, (id) => document.querySelector(`[data-job="${id}"] img`)?.naturalWidth > 0, jobId('done'));
   }));
 
 test('progress and the end of a job arrive without a reload', () =>
   withGallery(async (page) => {
     const id = jobId('running');
-    mock.emit('progress', { job: id, stage: 'subdivide', done: 3, total: 4, fraction: 0.75, eta_s: 3 });
+    mock.emit('progress', { job: id, stage: 'subdivide', done: 3, total: 4, fraction: 0.75, eta_s: 3, error: 0.034 });
     await until(page, (i) => document.querySelector(`[data-job="${i}"] progress`).value === 0.75, id);
+    assert.match(await card(page, 'running').innerText(), /75 %, 3\.0 s left, error 3\.4\s% so far/);
     assert.match(await card(page, 'running').innerText(), /subdivide · 75 %, 3.0 s left/);
     mock.change(id, { status: 'succeeded', progress: null, artifacts: mock.jobs.get(jobId('done')).artifacts });
     await until(page, (i) => document.querySelector(`[data-job="${i}"]`).dataset.status === 'succeeded', id);

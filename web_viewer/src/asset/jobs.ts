@@ -9,6 +9,7 @@ export interface Progress {
   total: number;
   fraction: number;
   eta_s: number | null;
+  error?: number; // that the last pass of a promise was certified with
 }
 
 export interface Problem {

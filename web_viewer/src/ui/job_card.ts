@@ -1,8 +1,8 @@
 // One job in the gallery. The card is built once and updated in place, so that focus and open details survive.
 
-import { artifact, artifactUrl, explain, finished, type Job, type Progress } from '../asset/jobs';
+import { artifact, artifactUrl, explain, finished, getReport, type Job, type Progress, type Report } from '../asset/jobs';
 import { copyText, h, replaceChildren } from './dom';
-import { ago, bytes, plain, seconds } from './format';
+import { ago, bytes, percent, plain, seconds } from './format';
 
 export interface CardActions {
   cancel(job: Job): void;
@@ -32,6 +32,7 @@ export class JobCard {
   private readonly files = h('ul', { class: 'files' });
   private readonly buttons = h('div', { class: 'card-buttons' });
   private shownThumb = '';
+  private certified: string | null = null; // null: not asked for yet
 
   constructor(
     job: Job,
@@ -55,6 +56,7 @@ export class JobCard {
     this.status.textContent = job.cached ? `${kStatusText[job.status]} (cached)` : kStatusText[job.status];
     this.status.className = `status status-${job.status}`;
     this.facts.textContent = this.factsText(job);
+    void this.askForError(job);
     this.problem.hidden = job.error === null;
     this.problem.textContent = explain(job.error);
     this.showThumb(job, name);
@@ -67,12 +69,24 @@ export class JobCard {
     const running = this.job.status === 'running';
     this.progress.hidden = !running;
     if (!running) return;
-    const { stage, fraction, eta_s } = progress ?? { stage: 'starting', fraction: NaN, eta_s: null };
+    const { stage, fraction, eta_s, error } = progress ?? { stage: 'starting', fraction: NaN, eta_s: null };
     this.bar.setAttribute('aria-label', `Progress of ${this.job.label || this.job.id}`);
     if (Number.isFinite(fraction)) this.bar.value = fraction;
     else this.bar.removeAttribute('value');
     const left = eta_s === null || eta_s === undefined ? '' : `, ${seconds(eta_s)} left`;
-    this.stage.textContent = Number.isFinite(fraction) ? `${stage} · ${Math.floor(100 * fraction)} %${left}` : stage;
+    const reached = error === undefined ? '' : `, error ${percent(error)} so far`;
+    this.stage.textContent = Number.isFinite(fraction)
+      ? `${stage} · ${Math.floor(100 * fraction)} %${left}${reached}`
+      : stage;
+  }
+
+  /// The error stands in the report, which is asked for once, when there is one.
+  private async askForError(job: Job): Promise<void> {
+    if (this.certified !== null || job.status !== 'succeeded' || !artifact(job, 'report.json')) return;
+    this.certified = '';
+    const { certificate } = await getReport(job).catch((): Report => ({}));
+    if (certificate?.relrmse !== undefined) this.certified = `error ${percent(certificate.relrmse)}`;
+    this.facts.textContent = this.factsText(this.job);
   }
 
   private factsText(job: Job): string {
@@ -83,6 +97,7 @@ export class JobCard {
       ago(job.created_at),
       took === null ? '' : `took ${seconds(took)}`,
       result ? bytes(result.bytes) : '',
+      this.certified ?? '',
       job.attempt > 1 ? `attempt ${job.attempt}` : '',
     ]
       .filter(Boolean)
