@@ -37,7 +37,8 @@ test('all jobs are shown, newest first, with status, time, error and picture', (
     const order = await page.$$eval('.card', (cards) => cards.map((c) => c.dataset.job));
     assert.deepEqual(order, [...mock.jobs.keys()].reverse());
     assert.match(await card(page, 'failed').innerText(), /Failed[^]*element 812: index 70001 is not below/);
-    const said = (i) => /Done[^]*took 24 s · 102 kB · error 1.2\s%/.test(document.querySelector(`[data-job="${i}"]`).innerText);
+    const said = (i) =>
+      /Done[^]*took 24 s · 102 kB · error 1\.2\s%/.test(document.querySelector(`[data-job="${i}"]`).innerText);
     await until(page, said, jobId('done')); // the error is read from the job's report
     await until(page, (id) => document.querySelector(`[data-job="${id}"] img`)?.naturalWidth > 0, jobId('done'));
   }));

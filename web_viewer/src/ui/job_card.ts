@@ -1,6 +1,15 @@
 // One job in the gallery. The card is built once and updated in place, so that focus and open details survive.
 
-import { artifact, artifactUrl, explain, finished, getReport, type Job, type Progress, type Report } from '../asset/jobs';
+import {
+  artifact,
+  artifactUrl,
+  explain,
+  finished,
+  getReport,
+  type Job,
+  type Progress,
+  type Report,
+} from '../asset/jobs';
 import { copyText, h, replaceChildren } from './dom';
 import { ago, bytes, percent, plain, seconds } from './format';
 
