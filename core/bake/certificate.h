@@ -1,8 +1,10 @@
 #pragma once
 // A bake checks itself: the decoded artefact against the path-traced reference, at random points of its surface.
 //
-// Points    area-uniform on the delivered surface; the reference stands at the nearest place of the input surface with
-//           a compatible normal.
+// Points    random on the delivered surface, half of them area-uniform, half where light changes, weighted so that
+// every
+//           figure is that of area-uniform ones; the reference stands at the nearest place of the input surface with a
+//           compatible normal.
 // Transport error: lightings of the artefact's own order (constant, six lobes, the job's light, the scene's lamps).
 //                  A lighting of which less than a hundredth reaches the surface, or a twentieth of what reaches it of
 //                  another (of lamps: a ten-thousandth), in truth and in the artefact, is listed as dark and not

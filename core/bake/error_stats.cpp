@@ -15,7 +15,7 @@ constexpr double kMaxAdditions = 2e8;  // of one bootstrap: about a second
 Vec3d absolute(const Vec3d& a) { return {std::abs(a.x), std::abs(a.y), std::abs(a.z)}; }
 double mean_channel(const Vec3d& a) { return (a.x + a.y + a.z) / 3; }
 
-/// What a point contributes to one lighting: means over RGB, not yet divided by the lighting's scale.
+/// What a point contributes to one lighting: means over RGB times its weight, not yet divided by the lighting's scale.
 struct Cell {
   double squared = 0;  // (x - ref)^2 - noise
   double size = 0;     // |ref|, or |x| where the lighting is dark
@@ -23,8 +23,9 @@ struct Cell {
 
 struct Table {
   std::size_t points = 0, lightings = 0;
-  std::vector<Cell> cells;  // lighting * points + point
-  std::vector<bool> dark;   // lightings without any light in reference and values
+  std::vector<Cell> cells;     // lighting * points + point
+  std::vector<bool> dark;      // lightings without any light in reference and values
+  std::vector<double> weight;  // of the points
 };
 
 double sum_of_sizes(std::span<const Vec3d> values) {
@@ -33,7 +34,9 @@ double sum_of_sizes(std::span<const Vec3d> values) {
 }
 
 Table make_table(const ErrorInput& in) {
-  Table table{in.points, in.values.size() / in.points, std::vector<Cell>(in.values.size()), {}};
+  Table table{in.points, in.values.size() / in.points, std::vector<Cell>(in.values.size()), {}, {}};
+  table.weight.assign(in.points, 1.0);
+  if (!in.weights.empty()) table.weight.assign(in.weights.begin(), in.weights.end());
   for (std::size_t lighting = 0; lighting < table.lightings; ++lighting) {
     const std::size_t first = lighting * in.points;
     const bool lit = sum_of_sizes(in.reference.subspan(first, in.points)) > 0;
@@ -42,16 +45,26 @@ Table make_table(const ErrorInput& in) {
     for (std::size_t i = first; i < first + in.points; ++i) {
       const Vec3d difference = in.values[i] - in.reference[i];
       const double noise = in.noise.empty() ? 0.0 : mean_channel(in.noise[i]);
-      table.cells[i] = {mean_channel(difference * difference) - noise, mean_channel(absolute(sizes[i]))};
+      const double weight = table.weight[i - first];
+      table.cells[i] = {weight * (mean_channel(difference * difference) - noise),
+                        weight * mean_channel(absolute(sizes[i]))};
     }
   }
   return table;
 }
 
-/// Sums over points of one lighting; relRMSE^2 = (squared / n) / (size / n)^2.
+/// Sums over points of one lighting, n their weight; relRMSE^2 = (squared / n) / (size / n)^2.
 double squared_error(const Cell& sum, double n) { return sum.size > 0 ? sum.squared * n / (sum.size * sum.size) : 0.0; }
 
 double to_error(double mean_squared) { return std::sqrt(std::max(mean_squared, 0.0)); }
+
+double weight_of(const Table& table, std::span<const std::uint32_t> points) {
+  double sum = 0;
+  for (const std::uint32_t point : points) sum += table.weight[point];
+  return sum;
+}
+
+double weight_of(const Table& table) { return std::accumulate(table.weight.begin(), table.weight.end(), 0.0); }
 
 std::vector<Cell> sums_over(const Table& table, std::span<const std::uint32_t> points) {
   std::vector<Cell> sums(table.lightings);
@@ -96,12 +109,13 @@ double normal_quantile(double p) {
 double acceleration(const Table& table, const std::vector<Cell>& sums) {
   std::vector<double> without(table.points);
   std::vector<Cell> rest(table.lightings);
+  const double n = weight_of(table);
   for (std::size_t point = 0; point < table.points; ++point) {
     for (std::size_t lighting = 0; lighting < table.lightings; ++lighting) {
       const Cell& cell = table.cells[lighting * table.points + point];
       rest[lighting] = {sums[lighting].squared - cell.squared, sums[lighting].size - cell.size};
     }
-    without[point] = mean_squared_error(rest, static_cast<double>(table.points - 1));
+    without[point] = mean_squared_error(rest, n - table.weight[point]);
   }
   const double mean = std::accumulate(without.begin(), without.end(), 0.0) / static_cast<double>(without.size());
   double second = 0, third = 0;
@@ -122,7 +136,7 @@ std::vector<double> resampled_errors(const Table& table, const Bootstrap& bootst
     for (std::uint32_t& point : drawn) {
       point = static_cast<std::uint32_t>(random.uniform_double() * static_cast<double>(table.points));
     }
-    errors[sample] = mean_squared_error(sums_over(table, drawn), static_cast<double>(table.points));
+    errors[sample] = mean_squared_error(sums_over(table, drawn), weight_of(table, drawn));
   }
   std::sort(errors.begin(), errors.end());
   return errors;
@@ -136,9 +150,24 @@ double quantile(const std::vector<double>& sorted, double p) {
   return sorted[below] * (1 - part) + sorted[above] * part;
 }
 
+struct Deviation {
+  double size, weight;
+};
+
+/// The size below which the share `p` of the weight lies.
+double quantile(const std::vector<Deviation>& sorted, double p) {
+  double all = 0, below = 0;
+  for (const Deviation& d : sorted) all += d.weight;
+  for (const Deviation& d : sorted) {
+    below += d.weight;
+    if (below >= p * all) return d.size;
+  }
+  return sorted.back().size;
+}
+
 /// [Efron87]: percentiles of the resampled figure, moved for its bias (z0) and its changing spread (a).
 void add_interval(const Table& table, const std::vector<Cell>& sums, const Bootstrap& bootstrap, ErrorStats& stats) {
-  const double squared = mean_squared_error(sums, static_cast<double>(table.points));
+  const double squared = mean_squared_error(sums, weight_of(table));
   stats.interval_low = stats.interval_high = to_error(squared);
   if (table.points < 2) return;
   const std::vector<double> errors = resampled_errors(table, bootstrap);
@@ -159,37 +188,41 @@ void add_interval(const Table& table, const std::vector<Cell>& sums, const Boots
 
 /// relRMSE of the points that are left when the worst hundredth (rounded up, never all) is taken out.
 double without_worst(const Table& table, const std::vector<Cell>& sums) {
-  const double n = static_cast<double>(table.points);
+  const double n = weight_of(table);
   std::vector<double> share(table.points);
   for (std::size_t i = 0; i < table.cells.size(); ++i) {
     const double size = sums[i / table.points].size;
-    if (size > 0) share[i % table.points] += table.cells[i].squared * n / (size * size);
+    const std::size_t point = i % table.points;
+    if (size > 0) share[point] += table.cells[i].squared / table.weight[point] * n / (size * size);
   }
   std::vector<std::uint32_t> points = all_points(table);
   std::stable_sort(points.begin(), points.end(), [&](auto a, auto b) { return share[a] < share[b]; });
-  if (points.size() > 1) points.resize(points.size() - (points.size() + 99) / 100);
+  for (double left_out = 0; points.size() > 1 && left_out < 0.01 * n; points.pop_back())
+    left_out += table.weight[points.back()];
   std::sort(points.begin(), points.end());
-  return to_error(mean_squared_error(sums_over(table, points), static_cast<double>(points.size())));
+  return to_error(mean_squared_error(sums_over(table, points), weight_of(table, points)));
 }
 
 /// Figures over single channels: p99, max, bias, and the noise that was subtracted.
 void add_channel_figures(const ErrorInput& in, const Table& table, const std::vector<Cell>& sums, ErrorStats& stats) {
-  std::vector<double> deviations;
+  std::vector<Deviation> deviations;
   deviations.reserve(3 * in.values.size());
   double signed_sum = 0, noise_sum = 0;
+  const double n = weight_of(table);
   for (std::size_t i = 0; i < in.values.size(); ++i) {
-    const double mean = sums[i / in.points].size / static_cast<double>(in.points);
+    const double mean = sums[i / in.points].size / n, weight = table.weight[i % in.points];
     const double scale = mean > 0 ? 1 / mean : 0;
     const Vec3d difference = (in.values[i] - in.reference[i]) * scale;
-    signed_sum += mean_channel(difference);
-    if (!in.noise.empty()) noise_sum += mean_channel(in.noise[i]) * scale * scale;
-    for (std::size_t c = 0; c < 3; ++c) deviations.push_back(std::abs(difference[c]));
+    signed_sum += weight * mean_channel(difference);
+    if (!in.noise.empty()) noise_sum += weight * mean_channel(in.noise[i]) * scale * scale;
+    for (std::size_t c = 0; c < 3; ++c) deviations.push_back({std::abs(difference[c]), weight});
   }
-  std::sort(deviations.begin(), deviations.end());
+  std::ranges::sort(deviations, {}, &Deviation::size);
   stats.p99 = quantile(deviations, 0.99);
-  stats.max = deviations.back();
-  stats.bias = signed_sum / static_cast<double>(table.cells.size());
-  stats.noise = std::sqrt(noise_sum / static_cast<double>(table.cells.size()));
+  stats.max = deviations.back().size;
+  const double all = n * static_cast<double>(table.lightings);
+  stats.bias = signed_sum / all;
+  stats.noise = std::sqrt(noise_sum / all);
 }
 
 }  // namespace
@@ -198,6 +231,7 @@ ErrorStats compute_error(const ErrorInput& in, const Bootstrap& bootstrap) {
   EXPECTS(in.values.size() == in.reference.size());
   EXPECTS(in.noise.empty() || in.noise.size() == in.values.size());
   EXPECTS(in.points > 0 ? in.values.size() % in.points == 0 : in.values.empty());
+  EXPECTS(in.weights.empty() || in.weights.size() == in.points);
   ErrorStats stats;
   if (in.values.empty()) return stats;
   const Table table = make_table(in);
@@ -205,9 +239,9 @@ ErrorStats compute_error(const ErrorInput& in, const Bootstrap& bootstrap) {
   stats.points = table.points;
   stats.lightings = static_cast<int>(table.lightings);
   stats.dark_lightings = static_cast<int>(std::count(table.dark.begin(), table.dark.end(), true));
-  stats.relrmse = to_error(mean_squared_error(sums, static_cast<double>(table.points)));
+  stats.relrmse = to_error(mean_squared_error(sums, weight_of(table)));
   for (const Cell& sum : sums) {
-    stats.by_lighting.push_back(to_error(squared_error(sum, static_cast<double>(table.points))));
+    stats.by_lighting.push_back(to_error(squared_error(sum, weight_of(table))));
   }
   stats.relrmse_without_worst_1pct = without_worst(table, sums);
   add_channel_figures(in, table, sums, stats);

@@ -19,10 +19,11 @@
 namespace kiln {
 
 struct ErrorInput {
-  std::span<const Vec3d> values;     // what the bake shows
-  std::span<const Vec3d> reference;  // same size
-  std::span<const Vec3d> noise;      // variance of each reference value, per channel; empty: the reference is exact
-  std::size_t points = 0;            // values.size() = lightings * points
+  std::span<const Vec3d> values;         // what the bake shows
+  std::span<const Vec3d> reference;      // same size
+  std::span<const Vec3d> noise;          // variance of each reference value, per channel; empty: the reference is exact
+  std::size_t points = 0;                // values.size() = lightings * points
+  std::span<const double> weights = {};  // of the points, where they are not drawn evenly; empty: all alike
 };
 
 struct Bootstrap {

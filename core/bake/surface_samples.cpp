@@ -8,11 +8,13 @@
 
 namespace kiln {
 
-std::vector<SurfaceSample> sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
+std::vector<SurfaceSample> sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed,
+                                          std::span<const double> density) {
   std::vector<double> sum;
   sum.reserve(mesh.triangles.size());
   double total = 0;
-  for (const Triangle& t : mesh.triangles) sum.push_back(total += triangle_area(mesh, t));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    sum.push_back(total += triangle_area(mesh, mesh.triangles[t]) * (density.empty() ? 1.0 : density[t]));
   std::vector<SurfaceSample> samples;
   if (!(total > 0)) return samples;
   samples.reserve(count);

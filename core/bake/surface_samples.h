@@ -2,6 +2,7 @@
 // Random points on a surface, uniform by area: where errors are measured, never at the vertices themselves.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/mesh/mesh.h"
@@ -13,8 +14,10 @@ struct SurfaceSample {
   float u = 0, v = 0;  // barycentrics of corners 1 and 2
 };
 
-/// `count` independent points; stratified over the running sum of areas, so that every large triangle is met.
-/// Empty when the mesh has no area.   Repeat  a function of mesh, count and seed.
-std::vector<SurfaceSample> sample_surface(const Mesh&, std::size_t count, std::uint64_t seed);
+/// `count` independent points; stratified over the running sum of areas, so that every large triangle is met. `density`
+/// of each triangle, relative, where they shall not lie evenly; empty: all alike.
+/// Empty when the mesh has no area.   Repeat  a function of mesh, count, seed and density.
+std::vector<SurfaceSample> sample_surface(const Mesh&, std::size_t count, std::uint64_t seed,
+                                          std::span<const double> density = {});
 
 }  // namespace kiln

@@ -105,6 +105,59 @@ TEST(ErrorStats, IsQuotedWithoutTheWorstHundredth) {
   EXPECT_GT(stats.relrmse, 0.3);
 }
 
+TEST(ErrorStats, APointOfWeightTwoIsThatPointTwice) {
+  // 200 points of two lightings, a third of them twice; sums in another order: double rounding.
+  Random random(3, 0);
+  std::vector<Vec3d> values(400), reference(400), values_twice, reference_twice;
+  for (std::size_t i = 0; i < 400; ++i) {
+    reference[i] = Vec3d{1, 2, 3} * (0.5 + random.uniform_double());
+    values[i] = reference[i] + gaussian3(random, 0.1);
+  }
+  std::vector<double> weights(200, 1.0);
+  for (std::size_t i = 0; i < 200; i += 3) weights[i] = 2;
+  for (std::size_t i = 0; i < 400; ++i) {
+    for (int times = 0; times < static_cast<int>(weights[i % 200]); ++times) {
+      values_twice.push_back(values[i]);
+      reference_twice.push_back(reference[i]);
+    }
+  }
+  const ErrorStats weighted = compute_error({values, reference, {}, 200, weights});
+  const ErrorStats twice = compute_error({values_twice, reference_twice, {}, values_twice.size() / 2});
+  EXPECT_NEAR(weighted.relrmse, twice.relrmse, 1e-12);
+  EXPECT_NEAR(weighted.bias, twice.bias, 1e-12);
+  EXPECT_NEAR(weighted.by_lighting[1], twice.by_lighting[1], 1e-12);
+  EXPECT_NEAR(weighted.p99, twice.p99, 1e-12);
+  EXPECT_NEAR(weighted.max, twice.max, 1e-12);
+}
+
+/// A thousandth of the surface is wrong by all of its light: relRMSE .0316. A hundred points a draw.
+TEST(ErrorStats, PointsDrawnWhereErrorsAreGiveTheSameFigureWithLessSpread) {
+  const auto spread = [](double share_drawn) {
+    double sum = 0, squares = 0;
+    constexpr int kDraws = 200, kPoints = 400;
+    for (std::uint64_t draw = 0; draw < kDraws; ++draw) {
+      Random random(7, draw);
+      std::vector<Vec3d> values, reference(kPoints, Vec3d{1, 1, 1});
+      std::vector<double> weights;
+      for (int i = 0; i < kPoints; ++i) {
+        const bool bad = random.uniform_double() < share_drawn;
+        values.push_back(bad ? Vec3d{2, 2, 2} : Vec3d{1, 1, 1});
+        weights.push_back(bad ? 1e-3 / share_drawn : (1 - 1e-3) / (1 - share_drawn));
+      }
+      const double found =
+          std::pow(compute_error({values, reference, {}, kPoints, weights}, {.resamples = 1}).relrmse, 2);
+      sum += found / kDraws;
+      squares += found * found / kDraws;
+    }
+    return std::pair{sum, std::sqrt(squares - sum * sum)};
+  };
+  const auto [even, even_spread] = spread(1e-3);
+  const auto [aimed, aimed_spread] = spread(0.3);
+  EXPECT_NEAR(even, 1e-3, 4 * even_spread / std::sqrt(200.0));    // four standard errors of 200 draws
+  EXPECT_NEAR(aimed, 1e-3, 4 * aimed_spread / std::sqrt(200.0));  // the same
+  EXPECT_LT(aimed_spread, 0.1 * even_spread);                     // by theory .05: sqrt(.7 / .3) / sqrt(1e3)
+}
+
 TEST(ErrorStats, ASceneLitByNothingHasErrorZeroAndSaysSo) {
   const std::vector<Vec3d> black(10, {0, 0, 0});
   const ErrorStats stats = compute_error({black, black, {}, 10});

@@ -47,8 +47,10 @@ TEST(Skip, BouncesThatThePlanLeavesOutAgainstMany) {
   const json few = baked("column", R"(,"samples":256,"subdivide":"off")");
   const json many = baked("column", R"(,"samples":256,"bounces":24,"subdivide":"off")");
   EXPECT_LT(few["parameters"]["bounces"].get<int>(), 24);
-  // The certificate's truth has them all.
-  EXPECT_LT(error_of(few), error_of(many) + few["error_sources"]["bounce_tail"].get<double>() + 1e-3);
+  // The certificate's truth has them all. Its points lie where the light of each result changes: two draws.
+  const double wide =
+      many["certificate"]["interval"][1].get<double>() - many["certificate"]["interval"][0].get<double>();
+  EXPECT_LT(error_of(few), error_of(many) + few["error_sources"]["bounce_tail"].get<double>() + wide);
 }
 
 }  // namespace
