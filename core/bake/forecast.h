@@ -1,11 +1,10 @@
 #pragma once
 // What a bake will cost, told before it: a pilot of the rays it is going to send, and counts of where it sends them.
 //
-// Mesh     a mesh of T triangles with B boundary edges has V = (T + B) / 2 vertices and E = (3 T + B) / 2 edges, but
-// for a
-//          few; splitting g T of them out of T makes B sqrt(g) of B.
+// Mesh     T triangles with B boundary edges have about V = (T + B) / 2 vertices and E = (3 T + B) / 2 edges; where T
+//          becomes g T by splitting, B becomes B sqrt(g)
 // Points   subdivision asks for light at V + E points and, roughly, at T; a mesh that is not split at its V
-// Seconds  direct rays as in the pilot, reflected ones at four times the price; the rest by vertices
+// Seconds  direct rays as in the pilot, reflected ones at kReflectedPrice times theirs; the rest by vertices
 // Error    seconds, memory and bytes: `kiln_forecast` (tests/bench) prints predicted / measured
 
 #include <cstdint>
