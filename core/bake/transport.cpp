@@ -40,6 +40,7 @@ class DirectSource {
         .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
         .bounded = {lamp_columns()},
         .hidden = hidden_test(tracer_),
+        .pierced = pierce_test(tracer_),
         .rough =
             [this](std::span<const TransferPoint> batch) {
               return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));

@@ -127,9 +127,10 @@ HiddenTest hidden_test(const Tracer& tracer) {
   return [&tracer, directions = hemisphere()](const TransferPoint& p) { return is_hidden(tracer, directions, p); };
 }
 
-std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& dark, const HiddenTest& test,
-                                    Threads& threads) {
-  const std::vector<TransferPoint> points = vertex_points(mesh);
+std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<StandIn>& known, const std::vector<bool>& dark,
+                                    const HiddenTest& test, Threads& threads) {
+  std::vector<TransferPoint> points = vertex_points(mesh);
+  for (const StandIn& s : known) points[s.vertex] = s.point;
   const std::vector<bool> hidden = test_all(points, test, threads);
   std::vector<Candidate> found = from_crossings(mesh, hidden, test, threads);
   if (!dark.empty()) {
@@ -137,6 +138,9 @@ std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& d
       if (dark[a] && !hidden[a] && !dark[b]) found.push_back({{a, points[a]}, 0});
     });
   }
+  std::erase_if(found, [&](const Candidate& c) {
+    return std::ranges::binary_search(known, c.stand_in.vertex, {}, &StandIn::vertex);
+  });
   std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) {
     return a.stand_in.vertex != b.stand_in.vertex ? a.stand_in.vertex < b.stand_in.vertex : a.distance < b.distance;
   });

@@ -53,7 +53,7 @@ class Subdivider {
   // Figure 2 of the paper, in rounds.
   void run(Threads& threads) {
     queue_new_leaves(threads);
-    while (mesh_->closed_triangles() < params_.triangles && !queue_.empty()) {
+    while (mesh_->closed_triangles() < room() && !queue_.empty()) {
       split_round();
       queue_new_leaves(threads);
     }
@@ -64,7 +64,7 @@ class Subdivider {
     evaluate(mesh_->take_new_points());
     mesh_.reset();  // its tables are not wanted any more; the fit needs the room
     Subdivided result;
-    result.stand_ins = stand_in(closed, threads);
+    result.stand_ins = stand_in(closed, cut(closed, threads), threads);
     if (params_.measure == SplitMeasure::residual) {
       result.values = fit_vertices(closed, std::move(rows_), source_.bounded, threads);
     } else {
@@ -80,20 +80,35 @@ class Subdivider {
   }
 
  private:
+  /// Cuts along contact lines; the new vertices, without rows yet.
+  std::vector<StandIn> cut(ClosedMesh& closed, Threads& threads) {
+    if (!source_.pierced) return {};
+    std::vector<StandIn> found = cut_pierced(closed, source_.pierced, params_.triangles, threads);
+    closed.point.resize(closed.mesh.position.size());
+    give_rows(found, closed);
+    return found;
+  }
+
   /// Gives hidden vertices the rows of their stand-ins, and takes back what hidden middles said.
-  std::vector<StandIn> stand_in(ClosedMesh& closed, Threads& threads) {
-    if (!source_.hidden) return {};
+  std::vector<StandIn> stand_in(ClosedMesh& closed, std::vector<StandIn> known, Threads& threads) {
+    if (!source_.hidden) return known;
     std::vector<bool> dark;
     for (const std::uint32_t point : closed.point) dark.push_back(is_dark(point));
-    std::vector<StandIn> found = find_stand_ins(closed.mesh, dark, source_.hidden, threads);
+    std::vector<StandIn> found = find_stand_ins(closed.mesh, known, dark, source_.hidden, threads);
+    give_rows(found, closed);
+    drop_hidden_middles(closed, threads);
+    known.insert(known.end(), found.begin(), found.end());
+    std::ranges::sort(known, {}, &StandIn::vertex);
+    return known;
+  }
+
+  void give_rows(const std::vector<StandIn>& stand_ins, ClosedMesh& closed) {
     std::vector<TransferPoint> points;
-    for (const StandIn& s : found) {
+    for (const StandIn& s : stand_ins) {
       closed.point[s.vertex] = static_cast<std::uint32_t>(rows_.size() + points.size());
       points.push_back(s.point);
     }
     evaluate(points);
-    drop_hidden_middles(closed, threads);
-    return found;
   }
 
   void drop_hidden_middles(ClosedMesh& closed, Threads& threads) const {
@@ -134,11 +149,26 @@ class Subdivider {
 
   void split_round() {
     const float least = kRound * queue_.top().error;
-    while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < params_.triangles) {
+    while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < room()) {
       const std::uint32_t leaf = queue_.top().leaf;
       queue_.pop();
-      mesh_->split(leaf, params_.triangles);
+      if (mesh_->split(leaf, room())) cuts_ -= cuts_of_[leaf];  // its children are counted when they are queued
     }
+  }
+
+  /// What the cuts along contact lines leave of the budget.
+  std::uint64_t room() const { return params_.triangles - std::min<std::uint64_t>(params_.triangles / 4, cuts_); }
+
+  /// Counts the pierced edges of leaves that came.
+  void count_cuts(const std::vector<std::uint32_t>& fresh, Threads& threads) {
+    cuts_of_.resize(mesh_->leaves().size(), 0);
+    if (!source_.pierced) return;
+    threads.for_blocks(fresh.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        cuts_of_[fresh[i]] =
+            static_cast<std::uint8_t>(pierced_edges(mesh_->mesh(), mesh_->leaves()[fresh[i]].corner, source_.pierced));
+    });
+    for (const std::uint32_t leaf : fresh) cuts_ += cuts_of_[leaf];
   }
 
   // Estimates the error of every leaf that came since the last call and queues those above the threshold.
@@ -150,6 +180,7 @@ class Subdivider {
       for (; seen_leaves_ < end && fresh.size() < batch_; ++seen_leaves_) {
         if (mesh_->leaves()[seen_leaves_].depth < params_.max_depth) fresh.push_back(seen_leaves_);
       }
+      count_cuts(fresh, threads);
       const std::vector<float> error =
           params_.measure == SplitMeasure::residual ? residuals(fresh, threads) : edge_errors(fresh, threads);
       for (std::size_t i = 0; i < fresh.size(); ++i) {
@@ -238,6 +269,8 @@ class Subdivider {
   std::size_t batch_;
   std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
+  std::vector<std::uint8_t> cuts_of_;  // of each leaf: its pierced edges
+  std::uint64_t cuts_ = 0;             // of all living leaves
   std::uint64_t evaluated_ = 0;
 };
 
@@ -252,7 +285,7 @@ Subdivided sample_vertices(const Mesh& input, const ValueSource& source, Threads
   out.values = evaluate(points);
   if (!source.hidden) return out;
 
-  out.stand_ins = find_stand_ins(input, {}, source.hidden, threads);
+  out.stand_ins = find_stand_ins(input, {}, {}, source.hidden, threads);
   std::vector<TransferPoint> moved;
   for (const StandIn& s : out.stand_ins) moved.push_back(s.point);
   const std::vector<float> values = evaluate(moved);
