@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <span>
 #include <utility>
@@ -49,6 +50,24 @@ std::optional<Pierced> pierced_edge(const Mesh& mesh, const Triangle& t, std::ui
   if (!found) return std::nullopt;
   const auto whole = [&](float share) { return margin + (1 - 2 * margin) * share; };
   return Pierced{whole(found->from_a), whole(found->from_b)};
+}
+
+float middle_of(const Pierced& p) { return 0.5F * (p.from_a + p.from_b); }
+
+/// Whether the line through two edges of a triangle, met at these shares of them from their common corner, is met
+/// halfway between as well.
+bool is_straight(const Mesh& mesh, const Triangle& t, std::size_t corner, float on_next, float on_before,
+                 const PierceTest& test) {
+  constexpr float kOff = 1.0F / 16;
+  const Vec3f at = mesh.position[t[corner]];
+  const Vec3f middle = (mesh.position[t[(corner + 1) % 3]] - at) * (0.5F * on_next) +
+                       (mesh.position[t[(corner + 2) % 3]] - at) * (0.5F * on_before);
+  const float share = 0.5F * (on_next + on_before);  // of the way through the middle to the third edge
+  TransferPoint near = between(mesh, t, t[corner], t[corner], 0), far = near;
+  near.position = at + middle * (kEnds / share);
+  far.position = at + middle * ((1 - kEnds) / share);
+  const auto found = test(near, far);
+  return found && std::abs(kEnds + (1 - 2 * kEnds) * middle_of(*found) - share) < kOff;
 }
 
 /// One edge in space: between welded places p < q, as it lies on one side of a seam.
@@ -173,8 +192,7 @@ class Cutter {
     const auto add = [&](std::uint32_t end, float light_at) {
       TransferPoint light = between(mesh, triangle, side.a, side.b, light_at);
       light.inward = (light.inward + mesh.position[end]) * 0.5F;
-      const std::uint32_t vertex =
-          append_between(closed_.mesh, side.a, side.b, 0.5F * (pierced.from_a + pierced.from_b));
+      const std::uint32_t vertex = append_between(closed_.mesh, side.a, side.b, middle_of(pierced));
       new_points_.push_back({vertex, light});
       return vertex;
     };
@@ -369,12 +387,19 @@ PierceTest pierce_test(const Tracer& tracer) {
   return [&tracer](const TransferPoint& a, const TransferPoint& b) { return find_pierced(tracer, a, b); };
 }
 
-int pierced_edges(const Mesh& mesh, const Triangle& t, const PierceTest& test) {
-  int count = 0;
+PiercedTriangle pierced_triangle(const Mesh& mesh, const Triangle& t, const PierceTest& test) {
+  std::array<std::optional<Pierced>, 3> edge;  // edge k from corner k to the next
+  PiercedTriangle out;
   for (std::size_t k = 0; k < 3; ++k) {
-    count += pierced_edge(mesh, t, t[k], t[(k + 1) % 3], test) ? 1 : 0;
+    edge[k] = pierced_edge(mesh, t, t[k], t[(k + 1) % 3], test);
+    if (edge[k]) ++out.edges;
   }
-  return count;
+  if (out.edges == 2) {
+    const std::size_t apart = !edge[0] ? 2 : !edge[1] ? 0 : 1;  // the corner of both edges
+    const std::size_t next = apart, before = (apart + 2) % 3;   // edges that leave it and arrive
+    out.straight = is_straight(mesh, t, apart, middle_of(*edge[next]), 1 - middle_of(*edge[before]), test);
+  }
+  return out;
 }
 
 std::vector<StandIn> cut_pierced(ClosedMesh& closed, const PierceTest& test, std::uint64_t budget, Threads& threads) {

@@ -32,8 +32,13 @@ using PierceTest = std::function<std::optional<Pierced>(const TransferPoint& a, 
 /// Keeps a reference to the tracer.
 PierceTest pierce_test(const Tracer&);
 
-/// How many edges of a triangle are pierced: about as many more triangles will there be.
-int pierced_edges(const Mesh&, const Triangle&, const PierceTest&);
+/// How a triangle is pierced.
+struct PiercedTriangle {
+  std::uint8_t edges = 0;  // about as many more triangles will there be
+  bool straight = false;   // the cut will follow the line: it is straight between two edges
+};
+
+PiercedTriangle pierced_triangle(const Mesh&, const Triangle&, const PierceTest&);
 
 /// Cuts the pierced edges of `closed` and returns the new vertices with the points whose light they have. The values of
 /// new vertices (closed.point) are the caller's to find.

@@ -20,6 +20,9 @@ namespace {
 // about half its parent's or less, so a round takes what the strict queue would take next, and fills a batch.
 constexpr float kRound = 0.6F;
 
+// Of the residual of a triangle that a straight contact line crosses: the cut takes the rest.
+constexpr float kPierced = 0.125F;
+
 struct Candidate {
   float error;
   std::uint32_t leaf;
@@ -152,23 +155,27 @@ class Subdivider {
     while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < room()) {
       const std::uint32_t leaf = queue_.top().leaf;
       queue_.pop();
-      if (mesh_->split(leaf, room())) cuts_ -= cuts_of_[leaf];  // its children are counted when they are queued
+      if (!mesh_->split(leaf, room())) continue;
+      cuts_ -= pierced_[leaf].edges;
+      cuts_to_come_ += 3 * std::uint64_t{pierced_[leaf].edges};  // of its children, until they are counted
     }
   }
 
-  /// What the cuts along contact lines leave of the budget.
-  std::uint64_t room() const { return params_.triangles - std::min<std::uint64_t>(params_.triangles / 4, cuts_); }
+  /// What the cuts along contact lines leave of the budget. Edges that are closed for their neighbours count more than
+  /// once: a quarter more is kept.
+  std::uint64_t room() const {
+    return params_.triangles - std::min(params_.triangles / 3, (cuts_ + cuts_to_come_) * 5 / 4);
+  }
 
   /// Counts the pierced edges of leaves that came.
   void count_cuts(const std::vector<std::uint32_t>& fresh, Threads& threads) {
-    cuts_of_.resize(mesh_->leaves().size(), 0);
+    pierced_.resize(mesh_->leaves().size());
     if (!source_.pierced) return;
     threads.for_blocks(fresh.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        cuts_of_[fresh[i]] =
-            static_cast<std::uint8_t>(pierced_edges(mesh_->mesh(), mesh_->leaves()[fresh[i]].corner, source_.pierced));
+        pierced_[fresh[i]] = pierced_triangle(mesh_->mesh(), mesh_->leaves()[fresh[i]].corner, source_.pierced);
     });
-    for (const std::uint32_t leaf : fresh) cuts_ += cuts_of_[leaf];
+    for (const std::uint32_t leaf : fresh) cuts_ += pierced_[leaf].edges;
   }
 
   // Estimates the error of every leaf that came since the last call and queues those above the threshold.
@@ -187,6 +194,7 @@ class Subdivider {
         if (error[i] > params_.threshold && error[i] > 0) queue_.push({coarse(error[i]), fresh[i]});
       }
     }
+    cuts_to_come_ = 0;
   }
 
   /// Rows of some points, unpacked: the columns of `points` one after the other.
@@ -244,6 +252,7 @@ class Subdivider {
         inner.load(i, middle.data());
         error[i] = residual_measure({a, b, c}, {ab, bc, ca}, middle,
                                     triangle_area(mesh_->mesh(), mesh_->leaves()[leaves[i]].corner));
+        if (pierced_[leaves[i]].straight) error[i] *= kPierced;
       }
     });
     return error;
@@ -269,8 +278,9 @@ class Subdivider {
   std::size_t batch_;
   std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
-  std::vector<std::uint8_t> cuts_of_;  // of each leaf: its pierced edges
-  std::uint64_t cuts_ = 0;             // of all living leaves
+  std::vector<PiercedTriangle> pierced_;  // of each leaf
+  std::uint64_t cuts_ = 0;                // pierced edges of all living leaves
+  std::uint64_t cuts_to_come_ = 0;
   std::uint64_t evaluated_ = 0;
 };
 
