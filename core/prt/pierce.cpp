@@ -18,6 +18,11 @@ namespace {
 constexpr float kEnds = 1.0F / 64;  // of an edge: nearer to its ends it is not cut
 constexpr float kClear = 3e-5F;     // unit cube: from there rays neither meet the surface nor what pierces it
 
+constexpr float kThick =
+    1.0F / 8;                     // of an edge: what is longer between two surfaces has light of its own and is no cut
+constexpr float kStands = 1e-4F;  // unit cube: what ends below that height pierces nothing. Tiles that overlap in one
+                                  // plane are within rounding of each other.
+
 /// A point at `share` of the way from a to b that leans into `triangle`.
 TransferPoint between(const Mesh& mesh, const Triangle& triangle, std::uint32_t a, std::uint32_t b, float share) {
   const Vec3f normal = normalized(mesh.normal[a] * (1 - share) + mesh.normal[b] * share, mesh.normal[a]);
@@ -36,7 +41,7 @@ std::optional<Pierced> find_pierced(const Tracer& tracer, const TransferPoint& a
   const Hit there = tracer.closest(start, along, way);
   if (!there) return std::nullopt;
   const Hit back = tracer.closest(end, -along, way);
-  if (!back) return std::nullopt;
+  if (!back || !tracer.occluded(start + a.normal * kStands, along, way)) return std::nullopt;
   return Pierced{std::clamp(there.t / way, 0.0F, 1.0F), 1 - std::clamp(back.t / way, 0.0F, 1.0F)};
 }
 
@@ -52,6 +57,7 @@ std::optional<Pierced> pierced_edge(const Mesh& mesh, const Triangle& t, std::ui
   return Pierced{whole(found->from_a), whole(found->from_b)};
 }
 
+bool can_be_cut(const Pierced& p) { return p.from_b - p.from_a < kThick; }
 float middle_of(const Pierced& p) { return 0.5F * (p.from_a + p.from_b); }
 
 /// Whether the line through two edges of a triangle, met at these shares of them from their common corner, is met
@@ -97,16 +103,17 @@ std::vector<Side> sides_of(const Mesh& mesh) {
 struct Cut {
   std::size_t first, last;  // of the sides
   Pierced pierced;
-  float length;
+  float worth;  // change of light times length
 };
 
-std::vector<Cut> find_cuts(const Mesh& mesh, const std::vector<Side>& sides, const PierceTest& test, Threads& threads) {
+std::vector<Cut> find_cuts(const Mesh& mesh, const std::vector<Side>& sides, const PierceTest& test,
+                           const LightContrast& contrast, Threads& threads) {
   std::vector<Cut> edges;
   for (std::size_t i = 0; i < sides.size(); ++i) {
     if (i > 0 && sides[i].p == sides[i - 1].p && sides[i].q == sides[i - 1].q) {
       edges.back().last = i + 1;
     } else {
-      edges.push_back({i, i + 1, {}, length(mesh.position[sides[i].b] - mesh.position[sides[i].a])});
+      edges.push_back({i, i + 1, {}, 0});
     }
   }
   std::vector<char> found(edges.size(), 0);
@@ -114,8 +121,9 @@ std::vector<Cut> find_cuts(const Mesh& mesh, const std::vector<Side>& sides, con
     for (std::size_t i = begin; i < end; ++i) {
       const Side& s = sides[edges[i].first];
       const auto pierced = pierced_edge(mesh, mesh.triangles[s.triangle], s.a, s.b, test);
-      if (!pierced) continue;
+      if (!pierced || !can_be_cut(*pierced)) continue;
       edges[i].pierced = *pierced;
+      edges[i].worth = contrast(s.a, s.b) * length(mesh.position[s.b] - mesh.position[s.a]);
       found[i] = 1;
     }
   });
@@ -126,9 +134,9 @@ std::vector<Cut> find_cuts(const Mesh& mesh, const std::vector<Side>& sides, con
   return out;
 }
 
-/// Each side of a cut edge is one more triangle: the longest edges are kept, as many as fit.
-void keep_longest(std::vector<Cut>& cuts, std::uint64_t room) {
-  std::ranges::stable_sort(cuts, std::greater{}, &Cut::length);
+/// Each side of a cut edge is one more triangle: the worthiest are kept, as many as fit.
+void keep_worthiest(std::vector<Cut>& cuts, std::uint64_t room) {
+  std::ranges::stable_sort(cuts, std::greater{}, &Cut::worth);
   std::uint64_t used = 0;
   std::erase_if(cuts, [&](const Cut& c) {
     const std::uint64_t more = c.last - c.first;
@@ -392,9 +400,10 @@ PiercedTriangle pierced_triangle(const Mesh& mesh, const Triangle& t, const Pier
   PiercedTriangle out;
   for (std::size_t k = 0; k < 3; ++k) {
     edge[k] = pierced_edge(mesh, t, t[k], t[(k + 1) % 3], test);
-    if (edge[k]) ++out.edges;
+    if (edge[k] && can_be_cut(*edge[k])) ++out.edges;
   }
-  if (out.edges == 2) {
+  const auto pierced = std::ranges::count_if(edge, [](const auto& e) { return e.has_value(); });
+  if (out.edges == 2 && pierced == 2) {
     const std::size_t apart = !edge[0] ? 2 : !edge[1] ? 0 : 1;  // the corner of both edges
     const std::size_t next = apart, before = (apart + 2) % 3;   // edges that leave it and arrive
     out.straight = is_straight(mesh, t, apart, middle_of(*edge[next]), 1 - middle_of(*edge[before]), test);
@@ -402,12 +411,13 @@ PiercedTriangle pierced_triangle(const Mesh& mesh, const Triangle& t, const Pier
   return out;
 }
 
-std::vector<StandIn> cut_pierced(ClosedMesh& closed, const PierceTest& test, std::uint64_t budget, Threads& threads) {
+std::vector<StandIn> cut_pierced(ClosedMesh& closed, const PierceTest& test, const LightContrast& contrast,
+                                 std::uint64_t budget, Threads& threads) {
   std::vector<StandIn> out;
   {
     const std::vector<Side> sides = sides_of(closed.mesh);
-    std::vector<Cut> cuts = find_cuts(closed.mesh, sides, test, threads);
-    keep_longest(cuts, budget - std::min<std::uint64_t>(budget, closed.mesh.triangles.size()));
+    std::vector<Cut> cuts = find_cuts(closed.mesh, sides, test, contrast, threads);
+    keep_worthiest(cuts, budget - std::min<std::uint64_t>(budget, closed.mesh.triangles.size()));
     if (!cuts.empty()) out = Cutter(closed, sides, cuts).run();
   }
   const std::vector<StandIn> apart = Separator(closed, sides_of(closed.mesh), test, threads).run();

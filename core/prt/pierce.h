@@ -6,7 +6,8 @@
 // vertices of its own there: light is continuous on each side. (Discontinuity meshing, Heckbert 1992, for contact
 // lines only.)
 // Crack-free  an edge is cut for all triangles that share it by position.   Cost  two rays an edge
-// Bounded     never more triangles than the budget: the longest edges are cut first.   Repeat  any thread count
+// Bounded     never more triangles than the budget: edges along which light changes most, times their length, are cut
+//             first.   Repeat  any thread count
 
 #include <cstdint>
 #include <functional>
@@ -40,8 +41,12 @@ struct PiercedTriangle {
 
 PiercedTriangle pierced_triangle(const Mesh&, const Triangle&, const PierceTest&);
 
+/// How much the light of two vertices differs.
+using LightContrast = std::function<float(std::uint32_t a, std::uint32_t b)>;
+
 /// Cuts the pierced edges of `closed` and returns the new vertices with the points whose light they have. The values of
 /// new vertices (closed.point) are the caller's to find.
-std::vector<StandIn> cut_pierced(ClosedMesh& closed, const PierceTest&, std::uint64_t budget, Threads&);
+std::vector<StandIn> cut_pierced(ClosedMesh& closed, const PierceTest&, const LightContrast&, std::uint64_t budget,
+                                 Threads&);
 
 }  // namespace kiln

@@ -21,7 +21,7 @@ namespace {
 constexpr float kRound = 0.6F;
 
 // Of the residual of a triangle that a straight contact line crosses: the cut takes the rest.
-constexpr float kPierced = 0.125F;
+constexpr float kPierced = 0.25F;
 
 struct Candidate {
   float error;
@@ -46,6 +46,7 @@ class Subdivider {
         rows_(source.width),
         source_(source),
         params_(params),
+        input_triangles_(input.triangles.size()),
         batch_(kBatch * static_cast<std::size_t>(threads.count())) {
     const std::vector<TransferPoint> points = vertex_points(input);
     for (std::size_t i = 0; i < points.size(); i += batch_) {
@@ -86,7 +87,10 @@ class Subdivider {
   /// Cuts along contact lines; the new vertices, without rows yet.
   std::vector<StandIn> cut(ClosedMesh& closed, Threads& threads) {
     if (!source_.pierced) return {};
-    std::vector<StandIn> found = cut_pierced(closed, source_.pierced, params_.triangles, threads);
+    const auto contrast = [&](std::uint32_t a, std::uint32_t b) {
+      return difference(closed.point[a], closed.point[b]);
+    };
+    std::vector<StandIn> found = cut_pierced(closed, source_.pierced, contrast, params_.triangles, threads);
     closed.point.resize(closed.mesh.position.size());
     give_rows(found, closed);
     return found;
@@ -131,6 +135,17 @@ class Subdivider {
     });
   }
 
+  float difference(std::uint32_t a, std::uint32_t b) const {
+    std::array<float, RowStore::kFour> x{}, y{};
+    double sum = 0;
+    for (std::size_t four = 0; four < rows_.fours(); ++four) {
+      rows_.load_four(a, four, x.data());
+      rows_.load_four(b, four, y.data());
+      for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - y[i]) * (x[i] - y[i]);
+    }
+    return static_cast<float>(std::sqrt(sum));
+  }
+
   bool is_dark(std::uint32_t point) const {
     std::array<float, RowStore::kFour> y{};
     for (std::size_t four = 0; four < rows_.fours(); ++four) {
@@ -161,10 +176,10 @@ class Subdivider {
     }
   }
 
-  /// What the cuts along contact lines leave of the budget. Edges that are closed for their neighbours count more than
-  /// once: a quarter more is kept.
+  /// What the cuts along contact lines leave of the budget: they get at most a quarter of the new triangles. Edges that
+  /// are closed for their neighbours count more than once: a quarter more is kept.
   std::uint64_t room() const {
-    return params_.triangles - std::min(params_.triangles / 3, (cuts_ + cuts_to_come_) * 5 / 4);
+    return params_.triangles - std::min((params_.triangles - input_triangles_) / 4, (cuts_ + cuts_to_come_) * 5 / 4);
   }
 
   /// Counts the pierced edges of leaves that came.
@@ -275,6 +290,7 @@ class Subdivider {
   RowStore rows_;  // of every point of mesh_
   const ValueSource& source_;
   const Subdivide& params_;
+  std::uint64_t input_triangles_;
   std::size_t batch_;
   std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
