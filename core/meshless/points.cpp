@@ -114,6 +114,7 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
   const AreaSampler triangles(scene.mesh);
   PointHierarchy out;
   if (!(triangles.total() > 0)) return out;
+  EXPECTS(expected_points(triangles.total(), std::ldexp(params.radius, 1 - params.levels)) < 0x1p31);
 
   float radius = params.radius;
   for (int level = 0; level < params.levels; ++level, radius *= 0.5F) {

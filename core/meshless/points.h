@@ -7,8 +7,8 @@
 //         normals, of others the front. A point whose normal's ray first meets a back is taken to be inside a solid and
 //         refused.
 // Differs A level ends after a number of proposals that follows from the area: kProposals A / R^2. The paper waits for
-//         1000 rejections in a row, which takes seconds on fine levels and no known time on crumpled surfaces. What is
-//         left uncovered is measured by the test: .1 % of the surface is farther than R from a point, none than 1.5 R.
+//         1000 rejections in a row, which takes seconds on fine levels and no known time on crumpled surfaces. Of a
+//         smooth surface .5 % is then farther than R from every point and nothing farther than 1.5 R (measured).
 // Cost    (4/3) kProposals A / R_finest^2 proposals, one after the other; one ray for each point.
 // Repeat  a pure function of scene and parameters.   Fails   never; a surface without area has no points
 
@@ -59,7 +59,8 @@ struct PointHierarchy {
 /// `radius` and `levels` filled in: half as many points as vertices, at least 8192 and at most 262144; five levels.
 PointPlacement resolve(const PointPlacement&, const Scene&);
 
-/// About how many points this much area takes down to radius R: .7 A / R^2 on smooth surfaces (measured).
+/// About how many points this much area takes down to radius R: .7 A / R^2 on smooth surfaces (measured). Callers
+/// refuse what would be too many: place_points goes through with any number below 2^31.
 double expected_points(double area, double radius);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
