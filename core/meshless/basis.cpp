@@ -111,19 +111,19 @@ std::uint32_t MeshlessBasis::nearest(const SurfaceSite& p, std::size_t level) co
   return nearest_of(levels_[level], p);
 }
 
-bool MeshlessBasis::terms(const SurfaceSite& p, std::size_t levels, std::vector<BasisTerm>& out) const {
-  bool found = false;
+Cover MeshlessBasis::terms(const SurfaceSite& p, std::size_t levels, std::vector<BasisTerm>& out) const {
+  Cover cover = Cover::none;
   for (std::size_t i = 0; i < std::min(levels, levels_.size()); ++i) {
     if (level_terms(levels_[i], p, out)) {
-      found = true;
-    } else if (!found) {
+      cover = Cover::functions;
+    } else if (cover == Cover::none) {
       const std::uint32_t j = nearest_of(levels_[i], p);
       if (j == kNoFunction) continue;
       out.push_back({j, 1});
-      found = true;
+      cover = Cover::nearest;
     }
   }
-  return found;
+  return cover;
 }
 
 Vec3f MeshlessBasis::evaluate(std::span<const Vec3f> coefficients, const SurfaceSite& p, std::size_t levels) const {

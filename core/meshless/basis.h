@@ -26,6 +26,9 @@ struct BasisTerm {
   float value = 0;
 };
 
+/// What a place was given: nothing, the nearest compatible point for want of anything better, or basis functions.
+enum class Cover : std::uint8_t { none, nearest, functions };
+
 /// K of equation 13.
 inline float falloff(float r) { return r < 1 ? (2 * r - 3) * r * r + 1 : 0.0F; }
 
@@ -42,8 +45,8 @@ class MeshlessBasis {
   float radius(std::uint32_t function) const { return radius_[function]; }
 
   /// Appends the functions of the first `levels` levels that are not 0 at p; those of one level add up to 1.
-  /// False, and nothing appended, where no level has a compatible point.
-  bool terms(const SurfaceSite& p, std::size_t levels, std::vector<BasisTerm>& out) const;
+  /// Cover::none, and nothing appended, where no level has a compatible point.
+  Cover terms(const SurfaceSite& p, std::size_t levels, std::vector<BasisTerm>& out) const;
 
   /// Equation 9 over the first `levels` levels.
   Vec3f evaluate(std::span<const Vec3f> coefficients, const SurfaceSite& p, std::size_t levels) const;

@@ -57,7 +57,7 @@ TEST(MeshlessBasis, FunctionsOfEachLevelSumToOne) {
   const MeshlessBasis basis = f.basis();
   for (const SurfaceSite& p : sphere_sites(500, 0.4F, 3)) {
     std::vector<BasisTerm> terms;
-    ASSERT_TRUE(basis.terms(p, basis.levels(), terms));
+    ASSERT_EQ(basis.terms(p, basis.levels(), terms), Cover::functions);
     std::vector<double> sum(basis.levels());
     for (const BasisTerm& t : terms) {
       EXPECT_GT(t.value, 0);
@@ -157,13 +157,13 @@ TEST(MeshlessBasis, TakesTheNearestCompatiblePointWhereNothingReaches) {
   const std::uint32_t end[] = {13};
   const MeshlessBasis basis(sites, end, threads);
   std::vector<BasisTerm> terms;
-  ASSERT_TRUE(basis.terms({{0.45F, 0, 0}, {0, 1, 0}}, 1, terms));
+  ASSERT_EQ(basis.terms({{0.45F, 0, 0}, {0, 1, 0}}, 1, terms), Cover::nearest);
   ASSERT_EQ(terms.size(), 1U);
   EXPECT_EQ(terms[0].function, 11U);
   EXPECT_EQ(terms[0].value, 1);
   EXPECT_EQ(basis.nearest({{0.45F, 0, 0}, {0, 1, 0}}, 0), 11U);
   terms.clear();
-  EXPECT_FALSE(basis.terms({{0.45F, 0, 0}, {0, 1, 0}, 7}, 1, terms));  // a group without points
+  EXPECT_EQ(basis.terms({{0.45F, 0, 0}, {0, 1, 0}, 7}, 1, terms), Cover::none);  // a group without points
   EXPECT_EQ(basis.nearest({{0.45F, 0, 0}, {0, 1, 0}, 7}, 0), MeshlessBasis::kNoFunction);
   EXPECT_EQ(basis.evaluate(std::vector<Vec3f>(13, {1, 1, 1}), {{0.45F, 0, 0}, {1, 0, 0}}, 1), Vec3f{});
 }
@@ -174,10 +174,10 @@ TEST(MeshlessBasis, FewerPointsThanNeighboursReachOverTheScene) {
   const std::uint32_t end[] = {3};
   const MeshlessBasis basis(sites, end, threads);
   std::vector<BasisTerm> terms;
-  ASSERT_TRUE(basis.terms({{0.5F, 0.5F, 0.5F}, {0, 1, 0}}, 1, terms));
+  ASSERT_EQ(basis.terms({{0.5F, 0.5F, 0.5F}, {0, 1, 0}}, 1, terms), Cover::functions);
   EXPECT_EQ(terms.size(), 3U);
   const MeshlessBasis none({}, {}, threads);
-  EXPECT_FALSE(none.terms({}, 1, terms));
+  EXPECT_EQ(none.terms({}, 1, terms), Cover::none);
 }
 
 TEST(MeshlessBasis, PointsOnOneAnotherDivideByNothing) {
