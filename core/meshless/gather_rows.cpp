@@ -13,7 +13,7 @@ namespace kiln {
 namespace {
 
 constexpr int kSets = 8;
-constexpr DirectRays kOnPaths{.lamps = {.few = 4, .many = 4}, .sky = 4};  // one of hundreds of rays passes by there
+constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = 2};  // one of hundreds of rays passes by there
 
 std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(std::clamp(x, 0.0F, 1.0F) * 65535)); }
 
@@ -22,7 +22,7 @@ std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(s
 GatherRows::GatherRows(const World& world, int rays, std::uint64_t seed)
     : world_(world), sets_(0, rays, kSets, mix64(seed)), seed_(seed) {}
 
-void GatherRows::add(std::span<const TransferPoint> points, Threads& threads, std::uint64_t& rays) {
+void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threads& threads, std::uint64_t& rays) {
   const std::size_t first_row = row_.size(), first_chunk = chunks_.size();
   row_.resize(first_row + points.size());
   chunks_.resize(first_chunk + (points.size() + kChunk - 1) / kChunk);
@@ -31,82 +31,91 @@ void GatherRows::add(std::span<const TransferPoint> points, Threads& threads, st
     const std::size_t chunk = first_chunk + begin / kChunk;
     std::vector<RowEntry>& entries = chunks_[chunk];
     entries.reserve((end - begin) * static_cast<std::size_t>(sets_.samples()));
-    std::uint64_t own = 0;
     for (std::size_t i = begin; i < end; ++i) {
       Row& row = row_[first_row + i];
       row.chunk = static_cast<std::uint32_t>(chunk);
       row.first = static_cast<std::uint32_t>(entries.size());
-      trace(points[i], entries, row, own);
+      Work work{entries, row, Random(seed_, point_key(points[i]), 1), 0, enclosed};
+      trace(points[i], work);
       row.count = static_cast<std::uint32_t>(entries.size()) - row.first;
+      sent += work.rays;
     }
     entries.shrink_to_fit();
-    sent += own;
   });
   rays += sent;
 }
 
-void GatherRows::trace(const TransferPoint& point, std::vector<RowEntry>& entries, Row& row,
-                       std::uint64_t& sent) const {
-  const std::uint64_t key = point_key(point);
-  const LocalFrame frame = local_frame(sets_, point.normal, seed_, key);
-  Random random(seed_, key, 1);
+void GatherRows::trace(const TransferPoint& point, Work& work) const {
+  const LocalFrame frame = local_frame(sets_, point.normal, seed_, point_key(point));
   const Vec3f origin = ray_origin(point);
   Rays16 rays;
   Hits16 hits;
   rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
+  const std::size_t before = work.entries.size();
   for (int packet = 0; packet < sets_.samples() / kPacket; ++packet) {
+    if (work.enclosed && packet * kPacket == kFirstRays && work.entries.size() == before && work.row.constant == Vec3f{}) {
+      break;
+    }
     sets_.turn(frame.set, packet, frame.basis, rays);
     world_.tracer.closest16(rays, hits);
+    work.rays += kPacket;
     for (std::size_t i = 0; i < kPacket; ++i) {
       if (hits.triangle[i] == kNoHit) continue;
-      const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
-      Vec3f throughput{1, 1, 1};
-      std::uint32_t sender = Senders::kNone;
-      if (!follow(hit, {rays.dx[i], rays.dy[i], rays.dz[i]}, throughput, random, row, sent, sender)) continue;
-      entries.push_back({sender, {to_fixed(throughput.x), to_fixed(throughput.y), to_fixed(throughput.z), 0}});
+      Path path{{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false}, {rays.dx[i], rays.dy[i], rays.dz[i]}};
+      const std::uint32_t sender = follow(path, work);
+      if (sender == Senders::kNone) continue;
+      const Vec3f& t = path.throughput;
+      work.entries.push_back({sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z), 0}});
     }
   }
-  sent += static_cast<std::uint64_t>(sets_.samples());
-  row.constant = row.constant / static_cast<float>(sets_.samples());
+  work.row.constant = work.row.constant / static_cast<float>(sets_.samples());
 }
 
-/// From a hit to the first sender. False where the path ends without one.
-bool GatherRows::follow(Hit hit, Vec3f direction, Vec3f& throughput, Random& random, Row& row, std::uint64_t& sent,
-                        std::uint32_t& sender) const {
+/// From a hit to the first sender, or kNone where the path ends without one.
+std::uint32_t GatherRows::follow(Path& path, Work& work) const {
   const Mesh& mesh = world_.tracer.scene().mesh;
   for (;;) {
-    const HitSide side = world_.faces.side(hit.triangle, direction);
-    if (side == HitSide::dark) return false;
-    const std::uint32_t part = mesh.part[hit.triangle];
+    const Hit& hit = path.hit;
+    const HitSide side = world_.faces.side(hit.triangle, path.direction);
+    if (side == HitSide::dark) return Senders::kNone;
     if (world_.faces.is_plain(hit.triangle)) {
-      throughput = throughput * world_.faces.plain(part);
+      path.throughput = path.throughput * world_.faces.plain(mesh.part[hit.triangle]);
     } else {
-      const auto draw = static_cast<std::uint32_t>(random.next());
-      throughput = throughput * world_.albedo.read(world_.albedo.tap(hit.triangle, hit.u, hit.v, draw));
+      const auto draw = static_cast<std::uint32_t>(work.random.next());
+      path.throughput = path.throughput * world_.albedo.read(world_.albedo.tap(hit.triangle, hit.u, hit.v, draw));
     }
-    const float most = std::max({throughput.x, throughput.y, throughput.z});
-    if (!(most > 0)) return false;
-    if (side == HitSide::front) {
-      sender = world_.senders.at(hit.triangle, hit.u, hit.v);
-      if (sender != Senders::kNone) return true;
-    }
-    // No sender stands for this place: light it, and go on in a random direction while the throughput lasts.
+    const float most = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
+    if (!(most > 0)) return Senders::kNone;
+    std::uint32_t sender = Senders::kNone;
+    if (side == HitSide::front) sender = world_.senders.at(hit.triangle, hit.u, hit.v);
+    if (sender != Senders::kNone && !work.enclosed) return sender;
+
     const Triangle& t = mesh.triangles[hit.triangle];
     Vec3f up = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
-    if (dot(up, direction) > 0) up = -up;
+    if (dot(up, path.direction) > 0) up = -up;
     const Vec3f place =
         mesh.position[t[0]] * (1 - hit.u - hit.v) + mesh.position[t[1]] * hit.u + mesh.position[t[2]] * hit.v;
     const Vec3f origin = offset_origin(place, up);
-    row.constant += throughput * world_.light.at({origin, up}, kOnPaths, random.next(), sent);
+    if (sender != Senders::kNone && sees(sender, origin)) return sender;
+
+    // No sender stands for this place: light it, and go on in a random direction while the throughput lasts.
+    work.row.constant += path.throughput * world_.light.at({origin, up}, kOnPaths, work.random.next(), work.rays);
     const float alive = std::min(1.0F, most);
-    if (random.uniform() >= alive) return false;
-    throughput = throughput / alive;
-    const float x = random.uniform(), y = random.uniform();
-    direction = normalized(basis_around(up).to_world(cosine_hemisphere(Vec2f{x, y})), up);
-    hit = world_.tracer.closest(origin, direction, kFar);
-    ++sent;
-    if (!hit) return false;
+    if (work.random.uniform() >= alive) return Senders::kNone;
+    path.throughput = path.throughput / alive;
+    const float x = work.random.uniform(), y = work.random.uniform();
+    path.direction = normalized(basis_around(up).to_world(cosine_hemisphere(Vec2f{x, y})), up);
+    path.hit = world_.tracer.closest(origin, path.direction, kFar);
+    ++work.rays;
+    if (!path.hit) return Senders::kNone;
   }
+}
+
+/// Whether nothing stands between a place and its sender.
+bool GatherRows::sees(std::uint32_t sender, const Vec3f& origin) const {
+  const Vec3f way = world_.senders.origin(sender) - origin;
+  const float distance = length(way);
+  return !(distance > 0) || !world_.tracer.occluded(origin, way / distance, distance);
 }
 
 Vec3f GatherRows::apply(std::size_t index, std::span<const Vec3f> senders) const {

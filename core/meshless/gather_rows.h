@@ -45,7 +45,10 @@ class GatherRows {
   GatherRows(const World&, int rays, std::uint64_t seed);
 
   /// Traces a row for each point and appends them in order. Adds the rays sent to `rays`.
-  void add(std::span<const TransferPoint>, Threads&, std::uint64_t& rays);
+  /// `enclosed`: the points are inside solids, where the nearest sender may stand beyond a wall. Then a sender answers
+  /// only for places it can see, and a point that its first kFirstRays rays find dark takes no more.
+  void add(std::span<const TransferPoint>, bool enclosed, Threads&, std::uint64_t& rays);
+  static constexpr int kFirstRays = 2 * kPacket;
   std::size_t size() const { return row_.size(); }
 
   /// Equation 1.
@@ -57,8 +60,23 @@ class GatherRows {
     std::uint32_t chunk = 0, first = 0, count = 0;
     Vec3f constant;
   };
-  void trace(const TransferPoint&, std::vector<RowEntry>& entries, Row&, std::uint64_t& rays) const;
-  bool follow(Hit, Vec3f direction, Vec3f& throughput, Random&, Row&, std::uint64_t& rays, std::uint32_t& sender) const;
+  /// One row in the making.
+  struct Work {
+    std::vector<RowEntry>& entries;
+    Row& row;
+    Random random;
+    std::uint64_t rays = 0;
+    bool enclosed = false;
+  };
+  /// A ray on its way to a sender.
+  struct Path {
+    Hit hit;
+    Vec3f direction;
+    Vec3f throughput{1, 1, 1};
+  };
+  void trace(const TransferPoint&, Work&) const;
+  std::uint32_t follow(Path&, Work&) const;
+  bool sees(std::uint32_t sender, const Vec3f& origin) const;
 
   World world_;
   DirectionSets sets_;

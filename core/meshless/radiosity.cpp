@@ -126,7 +126,7 @@ class Solver {
       receiver_.push_back(points[i]);
       places.push_back(at_[points[i]]);
     }
-    rows_->add(places, threads_, out_.stats.gather_rays);
+    rows_->add(places, false, threads_, out_.stats.gather_rays);
     first_bounce_.resize(receiver_.size());
     threads_.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = first + begin; r < first + end; ++r) first_bounce_[r] = rows_->apply(r, direct_);
@@ -207,19 +207,22 @@ class Solver {
       places.push_back({p.position, p.normal, params_.points.groups_by_part ? part[v] : 0});
     }
     at_vertices_.emplace(basis, places, threads_);
-    std::vector<char> alone(vertices_.size());
-    threads_.for_blocks(vertices_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) {
-        alone[v] = at_vertices_->cover(v) != Cover::functions || is_enclosed(tracer_, faces_, vertices_[v]) ? 1 : 0;
-      }
+    enum Reading : char { interpolated, own_row, enclosed };
+    std::vector<char> reading(vertices_.size());
+    for_each(vertices_.size(), [&](std::size_t v) {
+      reading[v] = is_enclosed(tracer_, faces_, vertices_[v])        ? enclosed
+                   : at_vertices_->cover(v) != Cover::functions ? own_row
+                                                                : interpolated;
     });
-    std::vector<TransferPoint> own;
-    for (std::uint32_t v = 0; v < alone.size(); ++v) {
-      if (alone[v] == 0) continue;
-      alone_.push_back(v);
-      own.push_back(vertices_[v]);
+    for (const Reading kind : {own_row, enclosed}) {
+      std::vector<TransferPoint> own;
+      for (std::uint32_t v = 0; v < reading.size(); ++v) {
+        if (reading[v] != kind) continue;
+        alone_.push_back(v);
+        own.push_back(vertices_[v]);
+      }
+      rows_->add(own, kind == enclosed, threads_, out_.stats.gather_rays);
     }
-    rows_->add(own, threads_, out_.stats.gather_rays);
     out_.stats.alone = alone_.size();
   }
 

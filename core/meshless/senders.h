@@ -12,6 +12,7 @@
 #include "core/base/threads.h"
 #include "core/meshless/point_grid.h"
 #include "core/meshless/points.h"
+#include "core/prt/ray_origin.h"
 #include "core/scene/scene.h"
 
 namespace kiln {
@@ -27,6 +28,8 @@ class Senders {
   std::uint32_t nearest(const SurfaceSite&) const;
   /// The same at a hit on the lit side of a face.
   std::uint32_t at(std::uint32_t triangle, float u, float v) const;
+  /// Where rays of a sender start.
+  Vec3f origin(std::uint32_t sender) const { return ray_origin(transfer_point(points_.points[sender])); }
 
  private:
   static constexpr std::uint32_t kLookUp = 0xfffffffeU;
