@@ -53,7 +53,8 @@ void GatherRows::trace(const TransferPoint& point, Work& work) const {
   rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
   const std::size_t before = work.entries.size();
   for (int packet = 0; packet < sets_.samples() / kPacket; ++packet) {
-    if (work.enclosed && packet * kPacket == kFirstRays && work.entries.size() == before && work.row.constant == Vec3f{}) {
+    if (work.enclosed && packet * kPacket == kFirstRays && work.entries.size() == before &&
+        work.row.constant == Vec3f{}) {
       break;
     }
     sets_.turn(frame.set, packet, frame.basis, rays);

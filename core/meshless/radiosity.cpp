@@ -210,7 +210,7 @@ class Solver {
     enum Reading : char { interpolated, own_row, enclosed };
     std::vector<char> reading(vertices_.size());
     for_each(vertices_.size(), [&](std::size_t v) {
-      reading[v] = is_enclosed(tracer_, faces_, vertices_[v])        ? enclosed
+      reading[v] = is_enclosed(tracer_, faces_, vertices_[v])   ? enclosed
                    : at_vertices_->cover(v) != Cover::functions ? own_row
                                                                 : interpolated;
     });
