@@ -20,7 +20,7 @@ std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(s
 }  // namespace
 
 GatherRows::GatherRows(const World& world, int rays, std::uint64_t seed)
-    : world_(world), sets_(0, rays, kSets, mix64(seed)), seed_(seed) {}
+    : world_(world), sets_(0, rays, kSets, mix64(seed), kFirstRays), seed_(seed) {}
 
 void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threads& threads, std::uint64_t& rays) {
   const std::size_t first_row = row_.size(), first_chunk = chunks_.size();

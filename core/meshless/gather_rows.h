@@ -48,7 +48,7 @@ class GatherRows {
   /// `enclosed`: the points are inside solids, where the nearest sender may stand beyond a wall. Then a sender answers
   /// only for places it can see, and a point that its first kFirstRays rays find dark takes no more.
   void add(std::span<const TransferPoint>, bool enclosed, Threads&, std::uint64_t& rays);
-  static constexpr int kFirstRays = 2 * kPacket;
+  static constexpr int kFirstRays = 4 * kPacket;  // a stratified set of their own
   std::size_t size() const { return row_.size(); }
 
   /// Equation 1.
