@@ -13,7 +13,7 @@ namespace kiln {
 namespace {
 
 constexpr int kSets = 8;
-constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = 2};  // one of hundreds of rays passes by there
+constexpr float kGrazing = 0.1F;  // cosine below which a ray's share in (2) grows no more
 
 std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(std::clamp(x, 0.0F, 1.0F) * 65535)); }
 
@@ -66,7 +66,8 @@ void GatherRows::trace(const TransferPoint& point, Work& work) const {
       const std::uint32_t sender = follow(path, work);
       if (sender == Senders::kNone) continue;
       const Vec3f& t = path.throughput;
-      work.entries.push_back({sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z), 0}});
+      const auto ray = static_cast<std::uint16_t>(static_cast<std::size_t>(packet * kPacket) + i);
+      work.entries.push_back({sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z)}, ray});
     }
   }
   work.row.constant = work.row.constant / static_cast<float>(sets_.samples());
@@ -100,7 +101,7 @@ std::uint32_t GatherRows::follow(Path& path, Work& work) const {
     if (sender != Senders::kNone && sees(sender, origin)) return sender;
 
     // No sender stands for this place: light it, and go on in a random direction while the throughput lasts.
-    work.row.constant += path.throughput * world_.light.at({origin, up}, kOnPaths, work.random.next(), work.rays);
+    work.row.constant += path.throughput * world_.light.at({origin, up}, work.random.next(), work.rays);
     const float alive = std::min(1.0F, most);
     if (work.random.uniform() >= alive) return Senders::kNone;
     path.throughput = path.throughput / alive;
@@ -131,6 +132,30 @@ Vec3f GatherRows::apply(std::size_t index, std::span<const Vec3f> senders) const
     sum.z += static_cast<float>(entry[k].albedo[2]) * x.z;
   }
   return row.constant + sum * (kUnit / static_cast<float>(sets_.samples()));
+}
+
+VectorValue GatherRows::apply_vector(std::size_t index, const TransferPoint& point,
+                                     std::span<const Vec3f> senders) const {
+  const Row& row = row_[index];
+  const LocalFrame frame = local_frame(sets_, point.normal, seed_, point_key(point));
+  const float unit = 1.0F / 65535 / static_cast<float>(sets_.samples());
+  VectorValue out{row.constant, {}};
+  Rays16 rays;
+  int packet = -1;
+  for (std::uint32_t k = 0; k < row.count; ++k) {
+    const RowEntry& entry = chunks_[row.chunk][row.first + k];
+    if (entry.ray / kPacket != packet) sets_.turn(frame.set, packet = entry.ray / kPacket, frame.basis, rays);
+    const std::size_t lane = entry.ray % kPacket;
+    const Vec3f w{rays.dx[lane], rays.dy[lane], rays.dz[lane]};
+    const float cosine = dot(w, point.normal);
+    const Vec3f aside = (w - point.normal * cosine) / std::max(cosine, kGrazing);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float light = static_cast<float>(entry.albedo[c]) * unit * senders[entry.sender][c];
+      out.value[c] += light;
+      out.turn[c] += aside * light;
+    }
+  }
+  return out;
 }
 
 }  // namespace kiln

@@ -12,6 +12,7 @@
 // Error   that of N cosine rays, the light of a sender's disk taken as one, albedo rounded to 2^-17
 // Repeat  same bits for any thread count
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -28,7 +29,21 @@ namespace kiln {
 /// One ray that found a sender.
 struct RowEntry {
   std::uint32_t sender = 0;
-  std::array<std::uint16_t, 4> albedo{};  // 65535 is 1; the fourth is padding
+  std::array<std::uint16_t, 3> albedo{};  // 65535 is 1
+  std::uint16_t ray = 0;
+};
+
+/// Irradiance / pi as a linear function of the normal, for each of R, G, B:
+///   value(n') = value + n' . turn_c,  turn_c = 1/N sum of light_k (w_k / (n . w_k) - n)                          (2)
+/// Rays that graze count as if they did so at kGrazing: their noise would be all that is seen.
+struct VectorValue {
+  Vec3f value;
+  std::array<Vec3f, 3> turn;  // at right angles to n
+
+  Vec3f at(const Vec3f& normal) const {
+    return {std::max(0.0F, value.x + dot(turn[0], normal)), std::max(0.0F, value.y + dot(turn[1], normal)),
+            std::max(0.0F, value.z + dot(turn[2], normal))};
+  }
 };
 
 class GatherRows {
@@ -39,7 +54,7 @@ class GatherRows {
     const GatherFaces& faces;
     const HitAlbedo& albedo;
     const Senders& senders;
-    const DirectLight& light;
+    const DirectLight& light;  // on paths: a few rays are enough
   };
   /// `rays` is rounded up to a multiple of kPacket.
   GatherRows(const World&, int rays, std::uint64_t seed);
@@ -53,6 +68,8 @@ class GatherRows {
 
   /// Equation 1.
   Vec3f apply(std::size_t row, std::span<const Vec3f> senders) const;
+  /// Equations 1 and 2; c_p has no direction. `point` is the one that the row was traced for.
+  VectorValue apply_vector(std::size_t row, const TransferPoint& point, std::span<const Vec3f> senders) const;
 
  private:
   static constexpr std::size_t kChunk = 64;  // rows: one unit of work and of memory

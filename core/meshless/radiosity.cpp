@@ -15,6 +15,7 @@ namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 128;
+constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = kPacket};  // one of hundreds of rays passes there
 constexpr float kChildReach = 2;  // of the parent level's R: points that a flagged point sends for
 
 double mean_of(const Vec3f& x) { return (double{x.x} + double{x.y} + double{x.z}) / 3; }
@@ -43,9 +44,13 @@ class Stencils {
     for (const auto& own : found) terms_.insert(terms_.end(), own.begin(), own.end());
   }
   Cover cover(std::size_t i) const { return cover_[i]; }
+  template <class F>
+  void each(std::size_t i, const F& f) const {
+    for (std::size_t k = begin_[i]; k < begin_[i + 1]; ++k) f(terms_[k]);
+  }
   Vec3f apply(std::size_t i, std::span<const Vec3f> values) const {
     Vec3f sum;
-    for (std::size_t k = begin_[i]; k < begin_[i + 1]; ++k) sum += values[terms_[k].function] * terms_[k].value;
+    each(i, [&](const BasisTerm& t) { sum += values[t.function] * t.value; });
     return sum;
   }
 
@@ -63,8 +68,11 @@ class Solver {
         threads_(threads),
         faces_(tracer.scene()),
         albedo_(tracer.scene()),
-        light_(tracer, sky),
+        light_(tracer, sky, params.direct),
+        rough_light_(tracer, sky, params.direct.rough()),
+        path_light_(tracer, sky, kOnPaths),
         vertices_(vertex_points(tracer.scene().mesh)) {
+    for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     begin_stage("points");
     points_ = place_points(tracer, faces_, params.points, threads);
     for (const MeshlessPoint& p : points_.points) {
@@ -72,18 +80,18 @@ class Solver {
       at_.push_back(transfer_point(p));
     }
     senders_.emplace(tracer.scene(), points_, params.points.groups_by_part, threads);
-    rows_.emplace(GatherRows::World{tracer_, faces_, albedo_, *senders_, light_}, params.rays, params.seed);
+    rows_.emplace(GatherRows::World{tracer_, faces_, albedo_, *senders_, path_light_}, params.rays, params.seed);
   }
 
   RadiosityResult solve() {
     begin_stage("direct");
-    out_.direct = direct_at(vertices_);
+    out_.direct = params_.known_direct.empty() ? direct_at(vertices_, light_) : params_.known_direct;
     out_.indirect.resize(vertices_.size());
     for (std::size_t level = 0; level < points_.levels(); ++level) {
       out_.stats.points.push_back(points_.level_end[level] - points_.begin(level));
     }
     if (params_.bounces == 0) return std::move(out_);
-    direct_ = direct_at(at_);
+    direct_ = direct_at(at_, rough_light_);
     begin_stage("gather");
     gather_adaptively();
     begin_stage("basis");
@@ -98,9 +106,9 @@ class Solver {
     if (params_.stage) params_.stage(name);
   }
 
-  std::vector<Vec3f> direct_at(const std::vector<TransferPoint>& places) {
+  std::vector<Vec3f> direct_at(const std::vector<TransferPoint>& places, const DirectLight& light) {
     std::vector<Vec3f> out(places.size());
-    if (light_.none()) return out;
+    if (light.none()) return out;
     std::atomic<std::uint64_t> rays = 0;
     const std::vector<std::uint32_t> order = morton_order_of(places);
     threads_.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -108,7 +116,7 @@ class Solver {
       for (std::size_t i = begin; i < end; ++i) {
         const TransferPoint& p = places[order[i]];
         const std::uint64_t seed = mix64(params_.seed ^ point_key(p));
-        out[order[i]] = light_.at({ray_origin(p), p.normal}, params_.direct, seed, own);
+        out[order[i]] = light.at({ray_origin(p), p.normal}, seed, own);
       }
       rays += own;
     });
@@ -239,7 +247,8 @@ class Solver {
   void iterate() {
     std::vector<Vec3f> gathered(receiver_.size()), next(receiver_.size()), total = direct_;
     double before = 0, ratio_before = 0;
-    const int most = params_.bounces < 0 ? kMostSweeps : params_.bounces;
+    const bool automatic = params_.bounces < 0;
+    const int most = automatic ? kMostSweeps : params_.bounces;
     for (int sweep = 0; sweep < most; ++sweep) {
       if (sweep > 0) spread(gathered, total);
       for_each(next.size(), [&](std::size_t r) { next[r] = rows_->apply(r, total); });
@@ -261,8 +270,19 @@ class Solver {
       out_.stats.sweeps = sweep + 1;
       if (params_.bounces < 0 && std::abs(change) <= kTail * light * (1 - std::min(ratio, 0.9999))) break;
     }
-    if (!alone_.empty()) spread(gathered, total);
-    for_each(vertices_.size(), [&](std::size_t v) { out_.indirect[v] = at_vertices_->apply(v, gathered); });
+    if (automatic) spread(gathered, total);
+    if (params_.vector) {
+      std::vector<VectorValue> turned(receiver_.size());
+      for_each(turned.size(), [&](std::size_t r) { turned[r] = rows_->apply_vector(r, at_[receiver_[r]], total); });
+      // The sweeps' own value, to which the rest of the series may have been added.
+      for_each(turned.size(), [&](std::size_t r) { turned[r].value = gathered[r]; });
+      for_each(vertices_.size(), [&](std::size_t v) {
+        at_vertices_->each(
+            v, [&](const BasisTerm& t) { out_.indirect[v] += turned[t.function].at(vertices_[v].normal) * t.value; });
+      });
+    } else {
+      for_each(vertices_.size(), [&](std::size_t v) { out_.indirect[v] = at_vertices_->apply(v, gathered); });
+    }
     for_each(alone_.size(),
              [&](std::size_t i) { out_.indirect[alone_[i]] = rows_->apply(receiver_.size() + i, total); });
   }
@@ -285,7 +305,7 @@ class Solver {
   Threads& threads_;
   GatherFaces faces_;
   HitAlbedo albedo_;
-  DirectLight light_;
+  DirectLight light_, rough_light_, path_light_;  // at vertices, at points, on the way of a ray
   std::vector<TransferPoint> vertices_;
   PointHierarchy points_;
   std::vector<SurfaceSite> sites_;  // of the points
@@ -304,6 +324,7 @@ class Solver {
 
 RadiosityResult solve_radiosity(const Tracer& tracer, const Environment* sky, const Radiosity& params,
                                 Threads& threads) {
+  EXPECTS(params.known_direct.empty() || params.known_direct.size() == tracer.scene().mesh.position.size());
   EXPECTS(params.rays >= 1 && params.rays <= 65536 && params.neighbours >= 1 && params.uniform_levels >= 1);
   return Solver(tracer, sky, params, threads).solve();
 }

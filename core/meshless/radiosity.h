@@ -9,7 +9,8 @@
 //    everywhere;
 //  - reflected light is read at vertices and at points that were not gathered from the flattened set of gathered
 //  points:
-//    one level of the Shepard basis (basis.h), radii by k nearest neighbours of whatever density is there;
+//    one level of the Shepard basis (basis.h), radii by k nearest neighbours of whatever density is there. What a
+//    vertex reads is first turned to its normal (vector irradiance, VectorValue of gather_rows.h);
 //  - vertices inside solids, and those that no function reaches, have rows of their own.
 // Bounces until what is left is below kTail of the light, or as many as asked for. When the sweeps' differences shrink
 //         by a steady factor the rest of the series is added as a geometric one.
@@ -25,6 +26,7 @@
 #include "core/base/threads.h"
 #include "core/meshless/direct_light.h"
 #include "core/meshless/points.h"
+#include "core/prt/hidden.h"
 #include "core/scene/environment.h"
 #include "core/trace/tracer.h"
 
@@ -38,7 +40,10 @@ struct Radiosity {
   float eps = 0.02F;       // of the mean light: prediction error above which finer points are gathered
   int bounces = -1;        // reflections; -1: until the tail is below kTail
   int neighbours = 10;     // of the flattened points around a vertex
+  bool vector = true;      // reflected light is turned to the normal where it is read; else it is read as it is
   std::uint64_t seed = 0;
+  std::vector<Vec3f> known_direct = {};  // direct light of each vertex; empty: it is found
+  std::vector<StandIn> stand_ins = {};   // where hidden vertices are lit instead; ascending (core/prt/hidden.h)
   std::function<void(std::string_view stage)> stage = {};  // told as each begins: points, direct, gather, basis, sweeps
 };
 

@@ -177,6 +177,7 @@ int main(int argc, char** argv) {
       run_rows(c, "quick", {.points = {.wanted = 4096}, .direct = {{16, 64}, 64}, .rays = 128, .eps = 0.05F}, repeats,
                threads);
       run_rows(c, "default", {}, repeats, threads);
+      run_rows(c, "scalar", {.vector = false}, repeats, threads);
       run_rows(c, "eps .01", {.eps = 0.01F}, repeats, threads);
       run_rows(c, "uniform", {.uniform_levels = 5}, repeats, threads);
       run_rows(c, "fine", {.points = {.wanted = 60000}, .direct = {{64, 512}, 1024}, .rays = 1024, .eps = 0.01F},

@@ -106,16 +106,16 @@ TEST(DirectLight, InAClosedBoxOfLampsIsTheirRadianceEverywhere) {
   Threads threads(1);
   const Tracer tracer(scene, threads);
   ASSERT_TRUE(FlatLamps::find(tracer));
-  const DirectLight light(tracer, nullptr);
+  const DirectLight light(tracer, nullptr, {});
   std::uint64_t rays = 0;
   for (const TransferPoint& p : vertex_points(scene.mesh)) {
-    EXPECT_NEAR(light.at({ray_origin(p), p.normal}, {}, point_key(p), rays).x, 1, 2e-3);
+    EXPECT_NEAR(light.at({ray_origin(p), p.normal}, point_key(p), rays).x, 1, 2e-3);
   }
   for (std::uint64_t i = 0; i < 50; ++i) {
     Random r(3, i);
     const Vec3f x{r.uniform() * 0.9F - 0.45F, r.uniform() * 0.9F - 0.45F, r.uniform() * 0.9F - 0.45F};
     const Vec3f n = to_float(uniform_sphere({r.uniform_double(), 0.1}));
-    EXPECT_NEAR(light.at({x, n}, {}, i, rays).x, 1, 1e-3);  // a sliver above the horizon may hold no point
+    EXPECT_NEAR(light.at({x, n}, i, rays).x, 1, 1e-3);  // a sliver above the horizon may hold no point
   }
 }
 
@@ -131,11 +131,11 @@ TEST(DirectLight, OfLampsAgreesWithBakeFixedDirect) {
   std::vector<TransferPoint> points = vertex_points(scene.mesh);
   points.resize(49);  // the floor
   const std::vector<Vec3f> truth = bake_fixed_direct(tracer, points, {.samples = 16384}, threads);
-  const DirectLight light(tracer, nullptr);
+  const DirectLight light(tracer, nullptr, {});
   std::uint64_t rays = 0;
   double error = 0, mean = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3f x = light.at({ray_origin(points[i]), points[i].normal}, {}, point_key(points[i]), rays);
+    const Vec3f x = light.at({ray_origin(points[i]), points[i].normal}, point_key(points[i]), rays);
     error += std::pow(x.y - truth[i].y, 2) / 49, mean += truth[i].y / 49;
   }
   // Half a lamp hidden at 128 strata: the border cells, about 20 of them, are left to chance: .5 sqrt(20) / 128 = .017
@@ -154,11 +154,11 @@ TEST(DirectLight, OfASkyAgreesWithTheReference) {
     for (const TransferPoint& p : points) places.push_back({ray_origin(p), p.normal, p.face_normal});
     const ReferenceResult truth =
         trace_reference(tracer, places, {.environments = {sky}}, {.samples = 4096, .bounces = 0}, threads);
-    const DirectLight light(tracer, &sky);
+    const DirectLight light(tracer, &sky, {.sky = 1024});
     std::uint64_t rays = 0;
     double error = 0, mean = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double x = light.at({ray_origin(points[i]), points[i].normal}, {.sky = 1024}, i, rays).x;
+      const double x = light.at({ray_origin(points[i]), points[i].normal}, i, rays).x;
       error += std::pow(x - truth.value[i].x, 2) / 100, mean += truth.value[i].x / 100;
     }
     // Stratified visibility at 1024 rays: .01 at a point (anchors.md), and .005 of the truth's own 4096.
@@ -170,10 +170,10 @@ TEST(DirectLight, IsNothingInTheDark) {
   const Scene scene = testing::room_scene();
   Threads threads(1);
   const Tracer tracer(scene, threads);
-  const DirectLight light(tracer, nullptr);
+  const DirectLight light(tracer, nullptr, {});
   std::uint64_t rays = 0;
   EXPECT_TRUE(light.none());
-  EXPECT_EQ(light.at({{0, 0, 0}, {0, 1, 0}}, {}, 1, rays), Vec3f{});
+  EXPECT_EQ(light.at({{0, 0, 0}, {0, 1, 0}}, 1, rays), Vec3f{});
   EXPECT_EQ(rays, 0U);
 }
 
