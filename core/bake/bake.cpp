@@ -91,10 +91,12 @@ Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Envir
   return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, light ? &*light : nullptr, threads);
 }
 
-/// The delivered file, read back, with the input's pixels so that textures show in the preview.
+/// The delivered file, read back, with the input's pixels so that textures show in the preview, and its warnings
+/// for the report.
 Result<BakedScene> reopen(const Bytes& file, const Scene& scene) {
   KILN_TRY(decoded, read_baked_glb(file));
   decoded.scene.images = scene.images;
+  decoded.scene.warnings = scene.warnings;
   return decoded;
 }
 

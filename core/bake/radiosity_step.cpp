@@ -112,6 +112,9 @@ Pilot pilot_direct(const Tracer& tracer, const Plan& plan, const Environment* sk
   return {seconds / n, static_cast<double>(rays) / n};
 }
 
+/// A count of what may be beyond counting.
+std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
+
 void predict_radiosity(Plan& plan, const Scene& scene, const Pilot& pilot, double points) {
   constexpr double kReflectedPrice = 3.4;  // of a gathering ray, as in forecast.cpp
   const double input = static_cast<double>(scene.mesh.position.size());
@@ -129,10 +132,10 @@ void predict_radiosity(Plan& plan, const Scene& scene, const Pilot& pilot, doubl
   Prediction& out = plan.prediction;
   out.triangles = static_cast<std::uint64_t>(triangles);
   out.vertices = static_cast<std::uint64_t>(vertices);
-  out.rays = static_cast<std::uint64_t>(direct + gathered);
+  out.rays = whole(direct + gathered);
   out.seconds = 0.2 + price * (direct + kReflectedPrice * gathered) + 1.4e-5 * triangles + 6e-6 * vertices;
-  out.memory_bytes = static_cast<std::uint64_t>(24e6 + 700 * vertices + points * (300 + 12.0 * plan.radiosity->rays) +
-                                                2 * pixels + 2 * files);
+  out.memory_bytes =
+      whole(24e6 + 700 * vertices + points * (300 + 12.0 * plan.radiosity->rays) + 2 * pixels + 2 * files);
   out.artifact_bytes = static_cast<std::uint64_t>(2000 + 2500.0 * static_cast<double>(scene.parts.size()) + files +
                                                   4.5 * (vertices + input) + 5 * vertices);
 }
