@@ -18,7 +18,9 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   const std::vector<Vec3f> light =
       environment ? project_environment(*environment, baked.transfer.order) : baked.light.coefficients;
   if (!environment) {
-    say(light.empty() ? "the artefact's own lamps" : "the light it was baked with: " + baked.light.name);
+    say(baked.transfer.order == 0 ? "the light of its job (radiosity)"
+        : light.empty()           ? "the artefact's own lamps"
+                                  : "the light it was baked with: " + baked.light.name);
   }
   Threads threads;
   const StopTogether together(session.interrupt, threads);

@@ -174,14 +174,14 @@ int main(int argc, char** argv) {
   Threads threads(2);
   for (const Case& c : load(scene)) {
     if (method == "rows" || method == "all") {
-      run_rows(c, "quick", {.points = {.wanted = 4096}, .direct = {{16, 64}, 64}, .rays = 128, .eps = 0.05F}, repeats,
-               threads);
-      run_rows(c, "default", {}, repeats, threads);
-      run_rows(c, "scalar", {.vector = false}, repeats, threads);
-      run_rows(c, "eps .01", {.eps = 0.01F}, repeats, threads);
-      run_rows(c, "uniform", {.uniform_levels = 5}, repeats, threads);
-      run_rows(c, "fine", {.points = {.wanted = 60000}, .direct = {{64, 512}, 1024}, .rays = 1024, .eps = 0.01F},
-               repeats, threads);
+      const LampRays few{16, 64}, many{64, 512};
+      const auto rows = [&](const std::string& knobs, const Radiosity& r) { run_rows(c, knobs, r, repeats, threads); };
+      rows("draft", {.points = {.wanted = 4096}, .direct = {few, 64}, .rays = 128, .eps = 0.05F});
+      rows("256 rays, eps .05", {.rays = 256, .eps = 0.05F});
+      rows("default", {});
+      rows("scalar", {.vector = false});
+      rows("all gathered", {.uniform_levels = 5});
+      rows("final", {.points = {.wanted = 60000}, .direct = {many, 1024}, .rays = 1024, .eps = 0.01F});
     }
     if (method == "vertices" || method == "all") {
       run_vertices(c, 64, 64, repeats, threads);
