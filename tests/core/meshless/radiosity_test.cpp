@@ -64,7 +64,7 @@ double error_against_paths(const Scene& scene, const RadiosityResult& r, const E
 
 TEST(Radiosity, InAWhiteFurnaceIsEmissionOverOneMinusAlbedo) {
   // A closed box of radiance 1: irradiance / pi is 1 / (1 - rho), of which 1 is direct.
-  for (const float rho : {0.5F, 0.9F, 0.99F}) {
+  for (const float rho : {0.5F, 0.9F, 0.99F, 0.999F}) {
     Scene scene = testing::empty_scene();
     testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 4, true,
                      add_lit_part(scene, {rho, rho, rho}, {1, 1, 1}));
@@ -170,6 +170,31 @@ TEST(Radiosity, OfVerticesInsideASolidIsDark) {
   const RadiosityResult r = solve(scene, {});
   EXPECT_GE(r.stats.alone, 9U);
   for (std::size_t v = first; v < first + 9; ++v) EXPECT_EQ(r.direct[v] + r.indirect[v], Vec3f{});
+}
+
+/// Mean light of the dark one of two rooms over that of the lit one; a wall of .005 (1/100 of a room) between them.
+double leak_of(const Radiosity& params) {
+  Scene scene = testing::empty_scene();
+  const std::uint32_t grey = testing::add_part(scene, {0.7F, 0.7F, 0.7F});
+  testing::add_box(scene, {-0.5F, -0.25F, -0.25F}, {0.5F, 0.25F, 0.25F}, 24, true, grey);
+  testing::add_box(scene, {-0.0025F, -0.25F, -0.25F}, {0.0025F, 0.25F, 0.25F}, 12, false, grey);
+  const std::uint32_t lamp = add_lit_part(scene, {0, 0, 0}, {5, 5, 5});
+  testing::add_grid(scene, {-0.3F, 0.2F, -0.05F}, {0.1F, 0, 0}, {0, 0, 0.1F}, 1, 1, lamp);
+  const RadiosityResult r = solve(scene, params);
+  double lit = 0, dark = 0;
+  std::size_t left = 0, right = 0;
+  for (std::size_t v = 0; v < r.direct.size(); ++v) {
+    const float x = scene.mesh.position[v].x;
+    if (x < -0.003F) lit += r.direct[v].x + r.indirect[v].x, ++left;
+    if (x > 0.002F) dark += r.direct[v].x + r.indirect[v].x, ++right;
+  }
+  return dark / static_cast<double>(right) / (lit / static_cast<double>(left));
+}
+
+TEST(Radiosity, HardlyLeaksThroughAThinWall) {
+  const double leak = leak_of({});
+  std::printf("leak %.5f\n", leak);
+  EXPECT_LT(leak, 1e-3);
 }
 
 TEST(Radiosity, IsTheSameForAnyThreadCount) {
