@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/meshless/gather_rows.h"
 #include "core/meshless/senders.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -265,6 +266,36 @@ TEST(Radiosity, SurvivesRandomTrianglesAndNormals) {
       ASSERT_LE(r.direct[v].x + r.indirect[v].x, 2);
     }
   }
+}
+
+TEST(GatherRows, KnowFromWhichSideLightComes) {
+  // From the middle of a room whose half x > 0 has light 1: E / pi = rho / 2 upwards, and the vector irradiance has
+  // rho / 2 along x. Rays below a cosine of kGrazing = .1 count less: of it 2 / pi * .05 = .032 is left out.
+  Scene scene = testing::empty_scene();
+  testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 8, true,
+                   testing::add_part(scene, {0.5F, 0.5F, 0.5F}));
+  Threads threads(2);
+  const Tracer tracer(scene, threads);
+  const GatherFaces faces(scene);
+  const HitAlbedo albedo(scene);
+  const PointHierarchy h = place_points(tracer, faces, {.wanted = 8000}, threads);
+  const Senders senders(scene, h, false, threads);
+  const DirectLight dark(tracer, nullptr, {});
+  GatherRows rows({tracer, faces, albedo, senders, dark}, 4096, 3);
+  const TransferPoint middle{{0, 0, 0}, {0, 1, 0}, {0, 0, 0}, {0, 1, 0}};
+  std::uint64_t rays = 0;
+  rows.add(std::span(&middle, 1), false, threads, rays);
+  EXPECT_EQ(rays, 4096U);
+  std::vector<Vec3f> light(h.points.size());
+  for (std::size_t i = 0; i < light.size(); ++i) light[i] = h.points[i].site.position.x > 0 ? Vec3f{1, 1, 1} : Vec3f{};
+  const VectorValue v = rows.apply_vector(0, middle, light);
+  EXPECT_NEAR(v.value.x, 0.25F, 0.005F);  // points are disks of .02: the border between the halves is ragged
+  EXPECT_FLOAT_EQ(v.value.x, rows.apply(0, light).x);
+  EXPECT_NEAR(v.turn[0].x, 0.5F * (0.5F - 0.032F), 0.01F);
+  EXPECT_NEAR(v.turn[0].y, 0, 1e-4F);
+  EXPECT_NEAR(v.turn[0].z, 0, 0.01F);
+  EXPECT_FLOAT_EQ(v.at(middle.normal).x, v.value.x);
+  EXPECT_GT(v.at(normalized(Vec3f{0.2F, 1, 0})).x, v.value.x * 1.1F);
 }
 
 TEST(Senders, AnswerWithTheNearestPointToWithinACell) {
