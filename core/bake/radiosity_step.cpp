@@ -216,11 +216,12 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
       log.advance(std::min(points, expected), expected);
       return out;
     };
-    const ValueSource source{3,
-                             [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
-                             {0, 1, 2},
-                             hidden_test(tracer),
-                             [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
+    const ValueSource source{.width = 3,
+                             .values = [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
+                             .bounded = {0, 1, 2},
+                             .hidden = hidden_test(tracer),
+                             .pierced = pierce_test(tracer),
+                             .rough = [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
     const Mesh base = plan.split && params.bounces != 0 ? refine_base(scene.mesh, plan, threads) : scene.mesh;
     Subdivide split = plan.subdivide;
     if (!plan.split) split = {.triangles = 0};
