@@ -119,7 +119,7 @@ class PrimitiveBuilder {
 
   void add_coefficients(const StoredTransfer& transfer) {
     for (std::size_t k = 0; k < vec4s_of(transfer.form().count()); ++k) {
-      add({"_PRT_" + std::to_string(k), true, false},
+      add({transfer.name(k), true, false},
           {StreamKind::generic, 4, transfer.bits(k), {-1, -1, -1, -1}, 2, transfer.pack(k, vertices_)});
     }
   }

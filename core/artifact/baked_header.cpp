@@ -51,9 +51,10 @@ void check_conventions(const Fields& extension, Findings& findings) {
 
 Transfer read_shape(const Fields& extension, Findings& findings) {
   Transfer out;
-  const std::uint64_t order = extension.count("order", 0), channels = extension.count("channels", 0);
-  if (order < 1 || order > kMaxShOrder) {
-    findings.fail("number_out_of_range", "The order must be 1 to 10.", extension.pointer("order"));
+  const std::uint64_t order = extension.count("order", kMaxShOrder + 1), channels = extension.count("channels", 0);
+  if (order > kMaxShOrder || (order == 0 && !extension.flag("fixed", false))) {
+    findings.fail("number_out_of_range", "The order must be 1 to 10, or 0 with fixed light.",
+                  extension.pointer("order"));
     return out;
   }
   if (channels != 1 && channels != 3) {
@@ -68,12 +69,13 @@ Transfer read_shape(const Fields& extension, Findings& findings) {
   return out;
 }
 
-void check_attribute_names(const Fields& extension, std::size_t numbers, Findings& findings) {
+void check_attribute_names(const Fields& extension, const Transfer& shape, std::size_t numbers, Findings& findings) {
   const std::vector<std::string> names = extension.texts("attributes");
   bool right = names.size() == vec4s_of(numbers);
-  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == "_PRT_" + std::to_string(k);
+  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == stored_name(shape, k);
   if (!right) {
-    findings.fail("slot_count_mismatch", "The attributes must be _PRT_0 and on, four numbers in each.",
+    findings.fail("slot_count_mismatch",
+                  "The attributes must be _PRT_0 and on (of order 0: _RADIOSITY), four numbers in each.",
                   extension.pointer("attributes"));
   }
 }
@@ -95,7 +97,7 @@ void read_form(const json& root, const Fields& extension, BakedHeader& out, Find
     return;
   }
   const std::size_t count = out.form.expected_count(out.shape);
-  check_attribute_names(extension, count, findings);
+  check_attribute_names(extension, out.shape, count, findings);
   const std::string scale = std::string(kPlace) + "/scale", offset = std::string(kPlace) + "/offset";
   out.form.scale = numbers(at(root, scale), scale, count, findings);
   out.form.offset = numbers(at(root, offset), offset, count, findings);

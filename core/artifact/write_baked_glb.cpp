@@ -27,7 +27,8 @@ json vec(const Vec3f& v) { return {v.x, v.y, v.z}; }
 
 void check_shape(const BakedScene& baked) {
   const Mesh& mesh = baked.scene.mesh;
-  EXPECTS(baked.transfer.order >= 1 && baked.transfer.order <= kMaxShOrder);
+  EXPECTS(baked.transfer.order >= 0 && baked.transfer.order <= kMaxShOrder);
+  EXPECTS(baked.transfer.order > 0 || (baked.transfer.fixed && baked.light.coefficients.empty()));
   EXPECTS(baked.transfer.channels == 1 || baked.transfer.channels == 3);
   EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
   EXPECTS(mesh.part.size() == mesh.triangles.size());
@@ -152,7 +153,7 @@ class Writer {
     const Transfer& t = baked_.transfer;
     const StoredForm& form = transfer_->form();
     json attributes = json::array(), light = json::array();
-    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back("_PRT_" + std::to_string(k));
+    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back(transfer_->name(k));
     for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
     json out = {{"version", 2},
                 {"basis", "real-sh"},

@@ -2,12 +2,14 @@
 // What a bake will model and what it leaves out, decided from cheap measurements, each with its reason.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/bake/forecast.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
+#include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
@@ -32,8 +34,9 @@ struct Plan {
   bool split = false;        // subdivide at all
   Subdivide subdivide;
   PrtStep::Encoding encoding;
-  int raw_bits = 12;           // of coefficients, where the encoding leaves them open
-  double compression = 0.005;  // relRMSE that components may add
+  int raw_bits = 12;                   // of coefficients, where the encoding leaves them open
+  double compression = 0.005;          // relRMSE that components may add
+  std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::vector<Decision> decisions;
   PointCosts costs;
   Prediction prediction;
