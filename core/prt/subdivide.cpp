@@ -20,8 +20,8 @@ namespace {
 // about half its parent's or less, so a round takes what the strict queue would take next, and fills a batch.
 constexpr float kRound = 0.6F;
 
-// Of the residual of a triangle that a straight contact line crosses: the cut takes the rest.
-constexpr float kPierced = 0.25F;
+// Of the residual of a triangle that a straight contact line crosses: the cut takes the rest, if there is room for it.
+constexpr float kPierced = 0.02F;
 
 struct Candidate {
   float error;
@@ -176,11 +176,14 @@ class Subdivider {
     }
   }
 
-  /// What the cuts along contact lines leave of the budget: they get at most a quarter of the new triangles. Edges that
-  /// are closed for their neighbours count more than once: a quarter more is kept.
-  std::uint64_t room() const {
-    return params_.triangles - std::min((params_.triangles - input_triangles_) / 4, (cuts_ + cuts_to_come_) * 5 / 4);
-  }
+  /// Triangles that cuts would make. Edges that are closed for their neighbours count more than once: a quarter more.
+  std::uint64_t cut_triangles() const { return (cuts_ + cuts_to_come_) * 5 / 4; }
+
+  /// They get at most a quarter of the new triangles,
+  std::uint64_t most_cut_triangles() const { return (params_.triangles - input_triangles_) / 4; }
+
+  /// and leave the rest of the budget.
+  std::uint64_t room() const { return params_.triangles - std::min(most_cut_triangles(), cut_triangles()); }
 
   /// Counts the pierced edges of leaves that came.
   void count_cuts(const std::vector<std::uint32_t>& fresh, Threads& threads) {
@@ -259,6 +262,7 @@ class Subdivider {
     RowStore inner(rows_.width());  // rounded as the others are: a constant has no residual
     inner.append(call_source(centroid, true));
 
+    const bool cuts_fit = 2 * cut_triangles() < most_cut_triangles();
     std::vector<float> error(leaves.size());
     threads.for_blocks(leaves.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       std::vector<float> room, middle(rows_.width());
@@ -267,7 +271,7 @@ class Subdivider {
         inner.load(i, middle.data());
         error[i] = residual_measure({a, b, c}, {ab, bc, ca}, middle,
                                     triangle_area(mesh_->mesh(), mesh_->leaves()[leaves[i]].corner));
-        if (pierced_[leaves[i]].straight) error[i] *= kPierced;
+        if (cuts_fit && pierced_[leaves[i]].straight) error[i] *= kPierced;
       }
     });
     return error;

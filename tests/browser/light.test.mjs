@@ -8,7 +8,7 @@ const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCoun
 const { sphereQuadrature } = await load('light/quadrature.ts');
 const { directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
 const { coefficientsOf, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
-const { lightOfStored } = await load('asset/kiln_reader.ts');
+const { lightOfStored, readExtension } = await load('asset/kiln_reader.ts');
 const { kSkies, projectSky } = await load('light/skies.ts');
 const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
 const { edgesOf } = await load('main/wireframe.ts');
@@ -179,6 +179,16 @@ test('grey transfer lights each channel by its own light; lamps can be put out',
   const light = Float32Array.of(1, 10, 100);
   assert.deepEqual([...relight(shape, coefficients, light, true)], [2.25, 20.25, 200.25]);
   assert.deepEqual([...relight(shape, coefficients, light, false)], [2, 20, 200]);
+});
+
+test('radiosity is read as the lamps’ light of order 0', () => {
+  const shape = { order: 0, channels: 3, fixed: true, slots: 1 };
+  assert.deepEqual([...relight(shape, Float32Array.of(1, 0.5, 0.25), new Float32Array(0), true)], [1, 0.5, 0.25]);
+  const { scale, offset } = stored(shape, [1, 1, 1]).transfer;
+  const extension = { ...shape, version: 2, form: 'raw', attributes: ['_RADIOSITY'], scale, offset };
+  const read = (changes) => readExtension({ extensions: { KILN_radiance_transfer: { ...extension, ...changes } } });
+  assert.equal(read({}).order, 0);
+  assert.throws(() => read({ fixed: false, slots: 0, scale: [], offset: [], attributes: [] }), /does not describe/);
 });
 
 test('RGB transfer takes each channel’s own slots', () => {

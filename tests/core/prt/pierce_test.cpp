@@ -55,7 +55,7 @@ double error_at_the_foot(int cells, bool double_sided, bool cut) {
     const Tracer tracer(scene, threads);
     return DirectTransferBaker(tracer, {.order = 1, .samples = 4096}).bake(places, threads);
   }();
-  Subdivided fine = refine(scene, 1500, cut, threads);
+  Subdivided fine = refine(scene, 4000, cut, threads);
   scene.mesh = std::move(fine.mesh);
   const Tracer tracer(scene, threads);
   double squares = 0, sum = 0;

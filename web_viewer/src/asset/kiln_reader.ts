@@ -112,7 +112,7 @@ function checkShape(e: RadianceTransferExtension): void {
   const good =
     (e.form === 'raw' || (e.form === 'components' && Number.isInteger(rank) && rank >= 1)) &&
     Number.isInteger(e.order) &&
-    e.order >= 1 &&
+    e.order >= (e.fixed ? 0 : 1) && // 0: radiosity, light that cannot be changed
     (e.channels === 1 || e.channels === 3) &&
     e.slots === slots &&
     e.scale?.length === numbers &&

@@ -32,9 +32,9 @@ export class Lights {
     this.known.set('baked', withOrder(baked, order));
     this.choices.push({
       id: 'baked',
-      label: baked.length > 0 ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
+      label: baked.length > 0 || (order === 0 && this.bakedName) ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
     });
-    this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
+    if (order > 0) this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
   }
 
   addFile(name: string, light: Float32Array, map: EquirectMap): void {
@@ -86,6 +86,7 @@ export class Lights {
   private skyOf(id: string): Sky | undefined {
     if (id !== 'baked') return kSkies.find((one) => one.id === id);
     const named = kSkies.find((one) => one.id === this.bakedName);
+    if (this.order === 0) return named; // there is nothing to compare
     return named && relativeDistance(this.coefficients(named.id), this.coefficients('baked')) < kSameSky
       ? named
       : undefined;

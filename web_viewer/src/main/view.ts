@@ -4,7 +4,6 @@ import { artifact, artifactUrl, getReport, type Job, type Report } from '../asse
 import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import { parseGltf } from '../asset/parse_gltf';
 import type { Relighter } from '../light/relighter';
-import { kSkies } from '../light/skies';
 import { announce, copyText, h, toast } from '../ui/dom';
 import { Divider } from '../ui/divider';
 import { helpDialog } from '../ui/help';
@@ -47,8 +46,10 @@ export async function show(page: Page, job: Job, begun: Begun): Promise<void> {
   const report: Promise<Report | null> = artifact(job, 'report.json')
     ? getReport(job).catch(() => null)
     : Promise.resolve(null);
-  const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
-  const pictures = new SkyPictures(new Lights(extension));
+  const lights = new Lights(extension);
+  const known = lights.choices.map(({ id }) => id);
+  const state = new Store(decodeState(location.hash.slice(1), known));
+  const pictures = new SkyPictures(lights);
   pictures.prepare(state.get()); // while the worker decodes
   const asset = await parseGltf(await opened, size);
   performance.mark('kiln:decoded');
