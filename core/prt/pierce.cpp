@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "core/mesh/midpoint.h"
@@ -81,7 +82,6 @@ struct Side {
   std::uint32_t p, q;  // places
   std::uint32_t a, b;  // vertices there
   std::uint32_t triangle;
-  friend auto operator<=>(const Side&, const Side&) = default;
 };
 
 std::vector<Side> sides_of(const Mesh& mesh) {
@@ -95,7 +95,7 @@ std::vector<Side> sides_of(const Mesh& mesh) {
       if (place[a] != place[b]) sides.push_back({place[a], place[b], a, b, t});
     }
   }
-  std::ranges::sort(sides);
+  std::ranges::sort(sides, {}, [](const Side& s) { return std::tuple(s.p, s.q, s.a, s.b, s.triangle); });
   return sides;
 }
 
