@@ -8,6 +8,7 @@
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
+#include "core/prt/cut_pierced.h"
 #include "core/prt/fit_vertices.h"
 #include "core/prt/row_store.h"
 #include "core/prt/split_measure.h"
@@ -170,9 +171,13 @@ class Subdivider {
     while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < room()) {
       const std::uint32_t leaf = queue_.top().leaf;
       queue_.pop();
-      if (!mesh_->split(leaf, room())) continue;
-      cuts_ -= pierced_[leaf].edges;
-      cuts_to_come_ += 3 * std::uint64_t{pierced_[leaf].edges};  // of its children, until they are counted
+      if (!mesh_->split(leaf, room())) {
+        if (++refused_ == kMostRefused) queue_ = {};
+        continue;
+      }
+      refused_ = 0;
+      cuts_ -= pierced_[leaf].cuts;
+      cuts_to_come_ += 3 * std::uint64_t{pierced_[leaf].cuts};  // of its children, until they are counted
     }
   }
 
@@ -193,7 +198,7 @@ class Subdivider {
       for (std::size_t i = begin; i < end; ++i)
         pierced_[fresh[i]] = pierced_triangle(mesh_->mesh(), mesh_->leaves()[fresh[i]].corner, source_.pierced);
     });
-    for (const std::uint32_t leaf : fresh) cuts_ += pierced_[leaf].edges;
+    for (const std::uint32_t leaf : fresh) cuts_ += pierced_[leaf].cuts;
   }
 
   // Estimates the error of every leaf that came since the last call and queues those above the threshold.
@@ -289,6 +294,8 @@ class Subdivider {
   }
 
   static constexpr std::size_t kBlock = 256;
+  static constexpr int kMostRefused =
+      256;  // splits one after another: the budget is full, and each attempt costs memory
   static constexpr std::size_t kBatch = 512;  // leaves or points at a time and thread: 0.3 MB not packed yet
   std::optional<SplitMesh> mesh_;
   RowStore rows_;  // of every point of mesh_
@@ -301,6 +308,7 @@ class Subdivider {
   std::vector<PiercedTriangle> pierced_;  // of each leaf
   std::uint64_t cuts_ = 0;                // pierced edges of all living leaves
   std::uint64_t cuts_to_come_ = 0;
+  int refused_ = 0;
   std::uint64_t evaluated_ = 0;
 };
 

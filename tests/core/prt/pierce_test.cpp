@@ -1,4 +1,4 @@
-#include "core/prt/pierce.h"
+#include "core/prt/cut_pierced.h"
 
 #include <gtest/gtest.h>
 
