@@ -60,10 +60,9 @@ std::vector<Cut> find_cuts(const Mesh& mesh, const PierceTest& test, const Light
       cuts.push_back({{s}, pierced, contrast(s.a, s.b) * length(mesh.position[s.b] - mesh.position[s.a])});
   }
   std::ranges::stable_sort(cuts, {}, key);
-  const auto repeated = std::ranges::unique(cuts, {}, key);
-  cuts.erase(repeated.begin(), repeated.end());
+  const auto same = [&](const Cut& c, const Cut& d) { return key(c) == key(d); };
+  cuts.erase(std::unique(cuts.begin(), cuts.end(), same), cuts.end());
 
-  for (Cut& cut : cuts) cut.sides.reserve(2);
   std::vector<std::vector<Side>> all(cuts.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     for_sides(mesh, place, t, [&](const Side& s) {

@@ -104,11 +104,18 @@ class Parter {
   }
 
  private:
-  bool apart(std::uint32_t a, std::uint32_t b, std::uint32_t t, std::uint32_t u) const {
-    const std::pair<std::uint32_t, std::uint32_t> edge = std::minmax({a, b}), pair = std::minmax({t, u});
-    const auto at = std::ranges::equal_range(contacts_, edge, {}, [](const Contact& c) { return std::pair(c.a, c.b); });
-    return std::ranges::any_of(
-        at, [&](const Contact& c) { return c.triangle[0] == pair.first && c.triangle[1] == pair.second; });
+  std::span<const Contact> contacts_on(std::uint32_t v, std::uint32_t w) const {
+    const auto edge_of = [](const Contact& c) { return std::pair(c.a, c.b); };
+    const std::pair<std::uint32_t, std::uint32_t> edge = std::minmax({v, w});
+    const auto first = std::ranges::lower_bound(contacts_, edge, {}, edge_of);
+    return {first, std::ranges::upper_bound(contacts_, edge, {}, edge_of)};
+  }
+
+  bool apart(std::uint32_t v, std::uint32_t w, std::uint32_t t, std::uint32_t u) const {
+    const auto [low, high] = std::minmax({t, u});
+    return std::ranges::any_of(contacts_on(v, w), [low = low, high = high](const Contact& c) {
+      return c.triangle[0] == low && c.triangle[1] == high;
+    });
   }
 
   /// The triangles around a vertex, those together that no contact keeps apart.
@@ -152,26 +159,19 @@ class Parter {
 
   TransferPoint light_in(std::uint32_t vertex, std::uint32_t triangle) const {
     float past = 0;
-    for (const Contact& c : contacts_of(triangle)) past = std::max(past, c.past[c.triangle[0] == triangle ? 0 : 1]);
+    const Triangle& t = mesh_.triangles[triangle];
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (const Contact& c : contacts_on(t[k], t[(k + 1) % 3])) {
+        for (std::size_t side = 0; side < 2; ++side)
+          if (c.triangle[side] == triangle) past = std::max(past, c.past[side]);
+      }
+    }
     const Vec3f inward = centroid(mesh_, mesh_.triangles[triangle]), at = mesh_.position[vertex];
     const float way = length(inward - at), share = std::min(0.5F, past + kClear / std::max(way, kClear));
     return {.position = at + (inward - at) * share,
             .normal = mesh_.normal[vertex],
             .inward = inward,
             .face_normal = normalized(area_vector(mesh_, mesh_.triangles[triangle]), mesh_.normal[vertex])};
-  }
-
-  std::vector<Contact> contacts_of(std::uint32_t triangle) const {
-    const Triangle& t = mesh_.triangles[triangle];
-    std::vector<Contact> out;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::pair<std::uint32_t, std::uint32_t> edge = std::minmax({t[k], t[(k + 1) % 3]});
-      for (const Contact& c :
-           std::ranges::equal_range(contacts_, edge, {}, [](const Contact& x) { return std::pair(x.a, x.b); })) {
-        if (c.triangle[0] == triangle || c.triangle[1] == triangle) out.push_back(c);
-      }
-    }
-    return out;
   }
 
   Mesh& mesh_;

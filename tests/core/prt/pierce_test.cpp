@@ -1,5 +1,3 @@
-#include "core/prt/cut_pierced.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/prt/cut_pierced.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/subdivide.h"
 #include "tests/core/prt/test_scenes.h"
