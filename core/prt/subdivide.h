@@ -3,8 +3,8 @@
 // Paper   Krivanek, Pattanaik, Zara 2004: figure 2 (loop), figure 3 (splits), eqs. 2-4 (measures).
 // Beyond  `residual` knows values halfway along the edges; they make the vertices better (fit_vertices.h).
 // Memory  at order 6 about 600 bytes a final vertex besides the mesh: rows of vertices and edge middles (row_store.h)
-// Contact triangles that another surface pierces are cut there (cut_pierced.h); a vertex inside a solid that still is beside
-//         a seen one stands for the last place that is seen (hidden.h)
+// Contact triangles that another surface pierces are cut there (cut_pierced.h); a vertex inside a solid that still is
+//         beside a seen one stands for the last place that is seen (hidden.h)
 // Error   rows are kept in 16 bits: 2^-13 of the largest of four neighbouring columns
 
 #include <cstdint>
