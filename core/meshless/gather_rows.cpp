@@ -5,9 +5,7 @@
 #include <cmath>
 
 #include "core/base/random.h"
-#include "core/mesh/topology.h"
 #include "core/prt/ray_origin.h"
-#include "core/sphere/sampling.h"
 
 namespace kiln {
 namespace {
@@ -19,8 +17,8 @@ std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(s
 
 }  // namespace
 
-GatherRows::GatherRows(const World& world, int rays, std::uint64_t seed)
-    : world_(world), sets_(0, rays, kSets, mix64(seed), kFirstRays), seed_(seed) {}
+GatherRows::GatherRows(const SenderPaths& paths, int rays, std::uint64_t seed)
+    : paths_(paths), sets_(0, rays, kSets, mix64(seed), kFirstRays), seed_(seed) {}
 
 void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threads& threads, std::uint64_t& rays) {
   const std::size_t first_row = row_.size(), first_chunk = chunks_.size();
@@ -58,66 +56,21 @@ void GatherRows::trace(const TransferPoint& point, Work& work) const {
       break;
     }
     sets_.turn(frame.set, packet, frame.basis, rays);
-    world_.tracer.closest16(rays, hits);
+    paths_.world().tracer.closest16(rays, hits);
     work.rays += kPacket;
     for (std::size_t i = 0; i < kPacket; ++i) {
       if (hits.triangle[i] == kNoHit) continue;
-      Path path{{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false}, {rays.dx[i], rays.dy[i], rays.dz[i]}};
-      const std::uint32_t sender = follow(path, work);
-      if (sender == Senders::kNone) continue;
-      const Vec3f& t = path.throughput;
+      const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
+      const Vec3f w{rays.dx[i], rays.dy[i], rays.dz[i]};
+      const SenderPaths::End end = paths_.follow(hit, w, work.enclosed, work.random, work.rays);
+      work.row.constant += end.picked_up;
+      if (end.sender == Senders::kNone) continue;
+      const Vec3f& t = end.throughput;
       const auto ray = static_cast<std::uint16_t>(static_cast<std::size_t>(packet * kPacket) + i);
-      work.entries.push_back({sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z)}, ray});
+      work.entries.push_back({end.sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z)}, ray});
     }
   }
   work.row.constant = work.row.constant / static_cast<float>(sets_.samples());
-}
-
-/// From a hit to the first sender, or kNone where the path ends without one.
-std::uint32_t GatherRows::follow(Path& path, Work& work) const {
-  const Mesh& mesh = world_.tracer.scene().mesh;
-  for (;;) {
-    const Hit& hit = path.hit;
-    const HitSide side = world_.faces.side(hit.triangle, path.direction);
-    if (side == HitSide::dark) return Senders::kNone;
-    if (world_.faces.is_plain(hit.triangle)) {
-      path.throughput = path.throughput * world_.faces.plain(mesh.part[hit.triangle]);
-    } else {
-      const auto draw = static_cast<std::uint32_t>(work.random.next());
-      path.throughput = path.throughput * world_.albedo.read(world_.albedo.tap(hit.triangle, hit.u, hit.v, draw));
-    }
-    const float most = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
-    if (!(most > 0)) return Senders::kNone;
-    std::uint32_t sender = Senders::kNone;
-    if (side == HitSide::front) sender = world_.senders.at(hit.triangle, hit.u, hit.v);
-    if (sender != Senders::kNone && !work.enclosed) return sender;
-
-    const Triangle& t = mesh.triangles[hit.triangle];
-    Vec3f up = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
-    if (dot(up, path.direction) > 0) up = -up;
-    const Vec3f place =
-        mesh.position[t[0]] * (1 - hit.u - hit.v) + mesh.position[t[1]] * hit.u + mesh.position[t[2]] * hit.v;
-    const Vec3f origin = offset_origin(place, up);
-    if (sender != Senders::kNone && sees(sender, origin)) return sender;
-
-    // No sender stands for this place: light it, and go on in a random direction while the throughput lasts.
-    work.row.constant += path.throughput * world_.light.at({origin, up}, work.random.next(), work.rays);
-    const float alive = std::min(1.0F, most);
-    if (work.random.uniform() >= alive) return Senders::kNone;
-    path.throughput = path.throughput / alive;
-    const float x = work.random.uniform(), y = work.random.uniform();
-    path.direction = normalized(basis_around(up).to_world(cosine_hemisphere(Vec2f{x, y})), up);
-    path.hit = world_.tracer.closest(origin, path.direction, kFar);
-    ++work.rays;
-    if (!path.hit) return Senders::kNone;
-  }
-}
-
-/// Whether nothing stands between a place and its sender.
-bool GatherRows::sees(std::uint32_t sender, const Vec3f& origin) const {
-  const Vec3f way = world_.senders.origin(sender) - origin;
-  const float distance = length(way);
-  return !(distance > 0) || !world_.tracer.occluded(origin, way / distance, distance);
 }
 
 Vec3f GatherRows::apply(std::size_t index, std::span<const Vec3f> senders) const {

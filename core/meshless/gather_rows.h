@@ -1,10 +1,8 @@
 #pragma once
 // Rows of the transport operator between points, traced once and read at every bounce.
 //   (T x)(p) = c_p + 1/N sum over N cosine rays of rho_k x[s_k],   s_k = the sender nearest to where ray k lands (1)
-// x is irradiance / pi at the senders. What has no sender (backs of double-sided faces, places inside solids) is
-// followed by a diffuse path until it meets one: rho_k is then the product along it, and direct light picked up on the
-// way is the row's constant c_p. Backs of single-sided faces are black. Emission that a ray meets is not counted: it is
-// direct light of p.
+// x is irradiance / pi at the senders. Rays are followed as in sender_paths.h: rho_k is the throughput, and what paths
+// pick up is the row's constant c_p.
 // Paper   Lehtinen et al. 2007, section 6.3, GATHER.   Differs  the paper evaluates the basis at every hit of every
 //         bounce, four fifths of its time; a row is a list of senders and albedos, so a bounce is a sparse sweep. Rays
 //         are Owen-scrambled Sobol points in eight sets, turned by a random azimuth, instead of one Hammersley set.
@@ -19,10 +17,8 @@
 #include <vector>
 
 #include "core/base/threads.h"
-#include "core/meshless/direct_light.h"
-#include "core/meshless/senders.h"
+#include "core/meshless/sender_paths.h"
 #include "core/prt/direction_sets.h"
-#include "core/prt/hit_albedo.h"
 
 namespace kiln {
 
@@ -48,16 +44,8 @@ struct VectorValue {
 
 class GatherRows {
  public:
-  /// What rays meet. All references must outlive the rows.
-  struct World {
-    const Tracer& tracer;
-    const GatherFaces& faces;
-    const HitAlbedo& albedo;
-    const Senders& senders;
-    const DirectLight& light;  // on paths: a few rays are enough
-  };
-  /// `rays` is rounded up to a multiple of kPacket.
-  GatherRows(const World&, int rays, std::uint64_t seed);
+  /// `rays` is rounded up to a multiple of kPacket. Keeps a reference to the paths.
+  GatherRows(const SenderPaths&, int rays, std::uint64_t seed);
 
   /// Traces a row for each point and appends them in order. Adds the rays sent to `rays`.
   /// `enclosed`: the points are inside solids, where the nearest sender may stand beyond a wall. Then a sender answers
@@ -85,17 +73,9 @@ class GatherRows {
     std::uint64_t rays = 0;
     bool enclosed = false;
   };
-  /// A ray on its way to a sender.
-  struct Path {
-    Hit hit;
-    Vec3f direction;
-    Vec3f throughput{1, 1, 1};
-  };
   void trace(const TransferPoint&, Work&) const;
-  std::uint32_t follow(Path&, Work&) const;
-  bool sees(std::uint32_t sender, const Vec3f& origin) const;
 
-  World world_;
+  const SenderPaths& paths_;
   DirectionSets sets_;
   std::uint64_t seed_;
   std::vector<Row> row_;

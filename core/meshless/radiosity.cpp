@@ -15,7 +15,6 @@ namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 128;
-constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = kPacket};  // one of hundreds of rays passes there
 constexpr float kChildReach = 2;  // of the parent level's R: points that a flagged point sends for
 
 double mean_of(const Vec3f& x) { return (double{x.x} + double{x.y} + double{x.z}) / 3; }
@@ -66,31 +65,30 @@ class Solver {
       : tracer_(tracer),
         params_(params),
         threads_(threads),
-        faces_(tracer.scene()),
-        albedo_(tracer.scene()),
         light_(tracer, sky, params.direct),
         rough_light_(tracer, sky, params.direct.rough()),
-        path_light_(tracer, sky, kOnPaths),
         vertices_(vertex_points(tracer.scene().mesh)) {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     begin_stage("points");
-    points_ = place_points(tracer, faces_, params.points, threads);
-    for (const MeshlessPoint& p : points_.points) {
+    out_.surface = std::make_unique<LitSurface>(tracer, sky, params.points, threads);
+    for (const MeshlessPoint& p : points().points) {
       sites_.push_back(p.site);
       at_.push_back(transfer_point(p));
     }
-    senders_.emplace(tracer.scene(), points_, params.points.groups_by_part, threads);
-    rows_.emplace(GatherRows::World{tracer_, faces_, albedo_, *senders_, path_light_}, params.rays, params.seed);
+    rows_.emplace(out_.surface->paths(), params.rays, params.seed);
   }
 
   RadiosityResult solve() {
     begin_stage("direct");
     out_.direct = params_.known_direct.empty() ? direct_at(vertices_, light_) : params_.known_direct;
     out_.indirect.resize(vertices_.size());
-    for (std::size_t level = 0; level < points_.levels(); ++level) {
-      out_.stats.points.push_back(points_.level_end[level] - points_.begin(level));
+    for (std::size_t level = 0; level < points().levels(); ++level) {
+      out_.stats.points.push_back(points().level_end[level] - points().begin(level));
     }
-    if (params_.bounces == 0) return std::move(out_);
+    if (params_.bounces == 0) {
+      out_.surface.reset();
+      return std::move(out_);
+    }
     direct_ = direct_at(at_, rough_light_);
     begin_stage("gather");
     gather_adaptively();
@@ -102,6 +100,8 @@ class Solver {
   }
 
  private:
+  const PointHierarchy& points() const { return out_.surface->points(); }
+
   void begin_stage(std::string_view name) const {
     if (params_.stage) params_.stage(name);
   }
@@ -152,10 +152,10 @@ class Solver {
   /// COMPUTE-BOUNCE's refinement, for all bounces at once.
   void gather_adaptively() {
     std::size_t before = 0;  // receivers of the levels above the last one
-    for (std::size_t level = 0; level < points_.levels(); ++level) {
+    for (std::size_t level = 0; level < points().levels(); ++level) {
       std::vector<std::uint32_t> chosen;
       if (level < static_cast<std::size_t>(params_.uniform_levels)) {
-        for (std::uint32_t p = points_.begin(level); p < points_.level_end[level]; ++p) chosen.push_back(p);
+        for (std::uint32_t p = points().begin(level); p < points().level_end[level]; ++p) chosen.push_back(p);
       } else {
         chosen = children_of(mispredicted(before), level);
       }
@@ -189,11 +189,11 @@ class Solver {
 
   /// The points of a level around points of the level above.
   std::vector<std::uint32_t> children_of(const std::vector<std::uint32_t>& parents, std::size_t level) const {
-    const float reach = kChildReach * points_.radius[level - 1];
+    const float reach = kChildReach * points().radius[level - 1];
     PointGrid grid(2 * reach);
     for (const std::uint32_t p : parents) grid.add(p, sites_[p].position);
     std::vector<std::uint32_t> out;
-    for (std::uint32_t p = points_.begin(level); p < points_.level_end[level]; ++p) {
+    for (std::uint32_t p = points().begin(level); p < points().level_end[level]; ++p) {
       bool near = false;
       grid.near(sites_[p].position, reach, [&](std::uint32_t q, float d2) {
         const float cosine = dot(sites_[p].normal, sites_[q].normal);
@@ -218,7 +218,7 @@ class Solver {
     enum Reading : char { interpolated, own_row, enclosed };
     std::vector<char> reading(vertices_.size());
     for_each(vertices_.size(), [&](std::size_t v) {
-      reading[v] = is_enclosed(tracer_, faces_, vertices_[v])   ? enclosed
+      reading[v] = is_enclosed(tracer_, out_.surface->faces(), vertices_[v])   ? enclosed
                    : at_vertices_->cover(v) != Cover::functions ? own_row
                                                                 : interpolated;
     });
@@ -285,6 +285,7 @@ class Solver {
     }
     for_each(alone_.size(),
              [&](std::size_t i) { out_.indirect[alone_[i]] = rows_->apply(receiver_.size() + i, total); });
+    out_.surface->set_light(std::move(total));
   }
 
   /// Direct and reflected light at all senders.
@@ -303,14 +304,10 @@ class Solver {
   const Tracer& tracer_;
   const Radiosity& params_;
   Threads& threads_;
-  GatherFaces faces_;
-  HitAlbedo albedo_;
-  DirectLight light_, rough_light_, path_light_;  // at vertices, at points, on the way of a ray
+  DirectLight light_, rough_light_;  // at vertices, at points
   std::vector<TransferPoint> vertices_;
-  PointHierarchy points_;
   std::vector<SurfaceSite> sites_;  // of the points
   std::vector<TransferPoint> at_;
-  std::optional<Senders> senders_;
   std::optional<GatherRows> rows_;       // of the receivers, then of `alone_`
   std::vector<Vec3f> direct_;            // at the points
   std::vector<std::uint32_t> receiver_;  // the point of each row

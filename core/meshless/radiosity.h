@@ -20,11 +20,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "core/base/threads.h"
 #include "core/meshless/direct_light.h"
+#include "core/meshless/lit_surface.h"
 #include "core/meshless/points.h"
 #include "core/prt/hidden.h"
 #include "core/scene/environment.h"
@@ -59,6 +61,8 @@ struct RadiosityStats {
 
 struct RadiosityResult {
   std::vector<Vec3f> direct, indirect;  // of each vertex of the tracer's mesh
+  std::unique_ptr<LitSurface> surface;  // with the light that one more reflection gathers: all of it, or that of
+                                        // bounces - 1 reflections where their number is given; null where that is 0
   RadiosityStats stats;
 };
 

@@ -36,7 +36,7 @@ std::vector<int> rounds_of(int packets, int first) {
 
 }  // namespace
 
-DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first)
+DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first, Spread spread)
     : samples_((samples + kPacket - 1) / kPacket * kPacket),
       sets_(sets),
       row_width_((sh_count(order) + 7) / 8 * 8),
@@ -46,7 +46,8 @@ DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t see
   x_.reserve(total), y_.reserve(total), z_.reserve(total);
   for (int set = 0; set < sets; ++set) {
     for (const Vec2f& u : square_points(rounds_, mix64(seed ^ static_cast<std::uint64_t>(set)))) {
-      const Vec3f w = cosine_hemisphere(u);
+      const Vec3f w =
+          spread == Spread::cosine ? cosine_hemisphere(u) : to_float(uniform_sphere(Vec2<double>{u.x, u.y}));
       if (order > 0) evaluate_sh(order, w, rows_.data() + x_.size() * static_cast<std::size_t>(row_width_));
       x_.push_back(w.x), y_.push_back(w.y), z_.push_back(w.z);
     }

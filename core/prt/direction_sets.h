@@ -1,5 +1,6 @@
 #pragma once
-// Cosine-distributed directions about +z with their SH values, made once and shared by all points.
+// Directions with their SH values, made once and shared by all points: cosine-distributed about +z, or uniform on the
+// sphere.
 //
 // Each set is a two-dimensional Owen-scrambled Sobol point set, mapped to the hemisphere without distortion. It comes
 // in rounds: the rays up to the end of each are a stratified set of their own, the last all of them. Within a round
@@ -16,11 +17,14 @@
 
 namespace kiln {
 
+enum class Spread { cosine, sphere };
+
 class DirectionSets {
  public:
   /// `samples` is rounded up to a multiple of kPacket. `order` 0: directions only. `first` rays make the first round,
   /// twice as many the first two, and so on; all rays are one round where it is 0.
-  DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first = 0);
+  DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first = 0,
+                Spread = Spread::cosine);
 
   int samples() const { return samples_; }
   int row_width() const { return row_width_; }

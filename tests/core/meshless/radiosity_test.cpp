@@ -281,7 +281,8 @@ TEST(GatherRows, KnowFromWhichSideLightComes) {
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 8000}, threads);
   const Senders senders(scene, h, false, threads);
   const DirectLight dark(tracer, nullptr, {});
-  GatherRows rows({tracer, faces, albedo, senders, dark}, 4096, 3);
+  const SenderPaths paths({tracer, faces, albedo, senders, dark});
+  GatherRows rows(paths, 4096, 3);
   const TransferPoint middle{{0, 0, 0}, {0, 1, 0}, {0, 0, 0}, {0, 1, 0}};
   std::uint64_t rays = 0;
   rows.add(std::span(&middle, 1), false, threads, rays);

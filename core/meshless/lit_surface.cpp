@@ -1,0 +1,33 @@
+#include "core/meshless/lit_surface.h"
+
+#include "core/base/expects.h"
+
+namespace kiln {
+namespace {
+
+constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = kPacket};  // one of hundreds of rays passes there
+
+}  // namespace
+
+LitSurface::LitSurface(const Tracer& tracer, const Environment* sky, const PointPlacement& placement, Threads& threads)
+    : tracer_(tracer),
+      faces_(tracer.scene()),
+      albedo_(tracer.scene()),
+      path_light_(tracer, sky, kOnPaths),
+      points_(place_points(tracer, faces_, placement, threads)),
+      senders_(tracer.scene(), points_, placement.groups_by_part, threads),
+      paths_({tracer_, faces_, albedo_, senders_, path_light_}),
+      light_(points_.points.size()) {}
+
+void LitSurface::set_light(std::vector<Vec3f> light) {
+  EXPECTS(light.size() == points_.points.size());
+  light_ = std::move(light);
+}
+
+Vec3f LitSurface::reflected(const Hit& hit, const Vec3f& direction, Random& random, std::uint64_t& rays) const {
+  const SenderPaths::End end = paths_.follow(hit, direction, false, random, rays);
+  if (end.sender == Senders::kNone) return end.picked_up;
+  return end.picked_up + end.throughput * light_[end.sender];
+}
+
+}  // namespace kiln

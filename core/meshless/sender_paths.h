@@ -1,0 +1,48 @@
+#pragma once
+// From where a ray lands to the point whose light it carries.
+//   L = throughput x value of the sender + picked_up
+// A hit has the sender nearest to it. What has none (backs of double-sided faces, places inside solids) is followed by
+// a diffuse path until it meets one; direct light on the way is picked up. Backs of single-sided faces are black.
+// Emission that a ray meets is not counted: it is direct light of where the ray came from.
+// Error   the light of a sender's disk is taken as one.   Repeat  a pure function of its arguments
+
+#include <cstdint>
+
+#include "core/base/random.h"
+#include "core/meshless/direct_light.h"
+#include "core/meshless/senders.h"
+#include "core/prt/gather_faces.h"
+#include "core/prt/hit_albedo.h"
+
+namespace kiln {
+
+class SenderPaths {
+ public:
+  /// What rays meet. All references must outlive the paths.
+  struct World {
+    const Tracer& tracer;
+    const GatherFaces& faces;
+    const HitAlbedo& albedo;
+    const Senders& senders;
+    const DirectLight& light;  // on paths: a few rays are enough
+  };
+  struct End {
+    std::uint32_t sender = Senders::kNone;  // kNone: the path ended without one
+    Vec3f throughput{1, 1, 1};
+    Vec3f picked_up;
+  };
+
+  explicit SenderPaths(const World& world) : world_(world) {}
+  const World& world() const { return world_; }
+
+  /// `hit` of a ray along `direction`. `enclosed`: the ray came from inside a solid, where the nearest sender may stand
+  /// beyond a wall; then a sender answers only for places it can see. Adds the rays sent to `rays`.
+  End follow(Hit hit, Vec3f direction, bool enclosed, Random&, std::uint64_t& rays) const;
+
+ private:
+  bool sees(std::uint32_t sender, const Vec3f& origin) const;
+
+  World world_;
+};
+
+}  // namespace kiln

@@ -1,0 +1,6 @@
+if(TARGET kiln_reference_set)
+  add_executable(kiln_grid_bench grid.cpp)
+  kiln_flags(kiln_grid_bench)
+  target_link_libraries(kiln_grid_bench PRIVATE kiln_grid kiln_reference_set)
+  target_compile_definitions(kiln_grid_bench PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
+endif()

@@ -1,0 +1,152 @@
+// Irradiance vector grids of the reference scene against its indirect light (comb - dir), and the rate of gathering.
+//   kiln_grid_bench [longest side] [rays]      default: 8, 16, 32, 64 with 512 rays
+// One JSON line a case: relRMSE at the vertices by blend, corners and filter; seconds; rays; bytes.
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <string>
+
+#include "core/grid/bake_grid.h"
+#include "core/grid/cell_corners.h"
+#include "core/meshless/radiosity.h"
+#include "tests/core/prt/reference_set.h"
+
+namespace kiln::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// The scene turned by an arbitrary angle about an arbitrary axis and scaled into the unit cube again.
+Scene rotated(Scene scene) {
+  const Vec3f axis = normalized(Vec3f{1, 2, 3});
+  const float angle = 0.7F, c = std::cos(angle), s = std::sin(angle), shrink = 1 / std::numbers::sqrt3_v<float>;
+  const auto turn = [&](const Vec3f& v) { return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c)); };
+  for (Vec3f& p : scene.mesh.position) p = turn(p) * shrink;
+  for (Vec3f& n : scene.mesh.normal) n = normalized(turn(n));
+  scene.frame.scale /= double{shrink};
+  return scene;
+}
+
+struct Case {
+  const char* name;
+  const Tracer& tracer;
+  const testing::ReferenceSet& set;
+  const std::vector<Vec3f>& truth;
+};
+
+using Look = std::function<Vec3f(const Vec3f& position, const Vec3f& normal)>;
+
+void report(const Case& c, const std::string& what, const std::string& more, const Look& look) {
+  std::vector<Vec3f> values;
+  const Mesh& mesh = c.tracer.scene().mesh;
+  for (const std::uint32_t v : c.set.vertex)
+    values.push_back(look(mesh.position[v], mesh.normal[v]) * std::numbers::inv_pi_v<float>);
+  const testing::RelativeError error = testing::relative_error(values, c.truth);
+  std::printf("{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"%s\",\"relrmse\":%.5f,\"without_worst_1pct\":%.5f%s}\n",
+              c.name, what.c_str(), error.all, error.without_worst, more.c_str());
+  std::fflush(stdout);
+}
+
+void run(const Case& c, const LitSurface& surface, int longest, int rays, Threads& threads) {
+  const Box box = box_of(c.tracer.scene().mesh);
+  for (const GridBlend blend : {GridBlend::exact, GridBlend::paper}) {
+    const auto start = Clock::now();
+    const BakedGrid baked = bake_grid({c.tracer, surface.faces(), &surface, nullptr},
+                                      {.size = even_size(box.low, box.high, longest), .blend = blend, .rays = rays},
+                                      threads);
+    const double seconds = since(start);
+    const Grid& grid = baked.grid;
+    const auto [x, y, z] = grid.lattice.size;
+    char more[256];
+    std::snprintf(more, sizeof more, ",\"size\":[%d,%d,%d],\"rays\":%llu,\"seconds\":%.3f,\"mrays_s\":%.2f", x, y, z,
+                  static_cast<unsigned long long>(baked.stats.rays), seconds,
+                  1e-6 * static_cast<double>(baked.stats.rays) / seconds);
+    const std::string name = blend == GridBlend::exact ? "exact" : "paper texels";
+    report(c, name + ", stored corners", more, [&](const Vec3f& p, const Vec3f& n) {
+      return irradiance_at(grid, to_double(p), n);
+    });
+    if (blend == GridBlend::paper) continue;
+    report(c, name + ", stored corners, cubic", "", [&](const Vec3f& p, const Vec3f& n) {
+      return irradiance_at(grid, to_double(p), n, GridPlace::surface, GridFilter::cubic);
+    });
+    report(c, name + ", eighths of cells", "", [&](const Vec3f& p, const Vec3f& n) {
+      return irradiance_at(grid, to_double(p), n, GridPlace::room);
+    });
+    report(c, name + ", all corners", "", [&](const Vec3f& p, const Vec3f& n) {
+      return irradiance_at(grid, to_double(p), n, GridPlace::anywhere);
+    });
+    const std::vector<Vec3f> stands = gather_places(grid.lattice, c.tracer.scene(), threads);
+    Grid own = grid;
+    report(c, name + ", a ray to each corner", "", [&](const Vec3f& p, const Vec3f& n) {
+      const CellPlace place = place_in(grid.lattice, to_double(p));
+      const std::uint8_t bits = corners_seen(c.tracer, grid.lattice, stands, place, offset_origin(p, n));
+      own.cells[grid.lattice.cell_index(place.cell)].surface.fill(bits);
+      return irradiance_at(own, to_double(p), n);
+    });
+  }
+}
+
+/// Rays of a vertex alone, without looking at what they hit: what Embree could do at most.
+void run_rate(const Case& c, const LitSurface& surface, int longest, int rays, Threads& threads) {
+  const Box box = box_of(c.tracer.scene().mesh);
+  const Lattice lattice = lattice_over(box.low, box.high, even_size(box.low, box.high, longest));
+  const std::vector<Vec3f> places = gather_places(lattice, c.tracer.scene(), threads);
+  const DirectionSets sets(0, rays, 8, 1, 0, Spread::sphere);
+  const auto start = Clock::now();
+  std::atomic<std::uint64_t> hits_found = 0;
+  threads.for_blocks(places.size(), 32, [&](std::size_t begin, std::size_t end) {
+    Rays16 packet;
+    Hits16 hits;
+    std::uint64_t found = 0;
+    packet.far.fill(4);
+    for (std::size_t v = begin; v < end; ++v) {
+      packet.ox.fill(places[v].x), packet.oy.fill(places[v].y), packet.oz.fill(places[v].z);
+      const LocalFrame frame = local_frame(sets, {0, 1, 0}, 1, v);
+      for (int k = 0; k < sets.samples() / kPacket; ++k) {
+        sets.turn(frame.set, k, frame.basis, packet);
+        c.tracer.closest16(packet, hits);
+        for (const std::uint32_t t : hits.triangle) found += t != kNoHit ? 1 : 0;
+      }
+    }
+    hits_found += found;
+  });
+  const double bare = 1e-6 * static_cast<double>(places.size()) * sets.samples() / since(start);
+  const auto again = Clock::now();
+  const BakedGrid baked = bake_grid({c.tracer, surface.faces(), &surface, nullptr},
+                                    {.size = lattice.size, .rays = rays, .corners = false}, threads);
+  const double ours = 1e-6 * static_cast<double>(baked.stats.rays) / since(again);
+  std::printf("{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"longest\":%d,\"rays\":%d,\"embree_mrays_s\":%.2f,"
+              "\"bake_mrays_s\":%.2f,\"ratio\":%.3f}\n",
+              c.name, longest, rays, bare, ours, ours / bare);
+}
+
+}  // namespace
+}  // namespace kiln::bench
+
+int main(int argc, char** argv) {
+  using namespace kiln;
+  using namespace kiln::bench;
+  Threads threads(2);
+  const auto set = testing::load_reference_set(KILN_SHARED, "cornell");
+  if (!set) return std::fprintf(stderr, "shared/models/references is not there\n"), 1;
+  std::vector<Vec3f> truth = set->values("cornell.comb");
+  const std::vector<Vec3f> direct = set->values("cornell.dir");
+  for (std::size_t i = 0; i < truth.size(); ++i) truth[i] -= direct[i];
+  std::vector<int> sides{8, 16, 32, 64};
+  if (argc > 1) sides = {std::atoi(argv[1])};
+  const int rays = argc > 2 ? std::atoi(argv[2]) : 512;
+  for (const bool turned : {false, true}) {
+    const Scene scene = turned ? rotated(set->scene) : set->scene;
+    const Tracer tracer(scene, threads);
+    const auto start = Clock::now();
+    const RadiosityResult light = solve_radiosity(tracer, nullptr, {}, threads);
+    std::fprintf(stderr, "radiosity %.2f s\n", since(start));
+    const Case c{turned ? "cornell rotated" : "cornell", tracer, *set, truth};
+    for (const int side : sides) run(c, *light.surface, side, rays, threads);
+    if (!turned) run_rate(c, *light.surface, sides.back(), rays, threads);
+  }
+}
