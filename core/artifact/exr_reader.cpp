@@ -6,11 +6,15 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
 
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
+#include "core/artifact/exr_parts.h"
 #include "core/artifact/hdr_reader.h"
 
 namespace kiln {
@@ -74,7 +78,80 @@ Result<Environment> read_pixels(Span file, const std::string& name) {
   return out;
 }
 
+constexpr const char* kChannels[] = {"R", "G", "B", "A"};
+
+/// Version 2 with multi-part 0x1000, but neither tiled 0x200 nor deep 0x800.
+bool is_scanline_parts(Span file) { return looks_like_exr_parts(file) && (file[5] & (0x02 | 0x08)) == 0; }
+
+Result<ExrPart> describe_part(const Imf::Header& header, const std::string& name) {
+  const Imath::Box2i window = header.dataWindow();
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
+                     height = std::int64_t{window.max.y} - window.min.y + 1;
+  if (!header.hasName() || window.min != Imath::V2i(0, 0) || width < 1 || height < 1)
+    return fault("exr_unsupported", "A part must have a name and start at 0, 0.", name);
+  ExrPart part{.name = header.name(), .width = static_cast<int>(width), .height = static_cast<int>(height)};
+  part.channels = 0;
+  for (const char* channel : kChannels) {
+    const Imf::Channel* found = header.channels().findChannel(channel);
+    if (!found) break;
+    if (found->xSampling != 1 || found->ySampling != 1) break;
+    ++part.channels;
+  }
+  if (part.channels == 0) return fault("exr_unsupported", "A part must have a full channel named R.", name);
+  for (auto it = header.begin(); it != header.end(); ++it) {
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
+      part.text[it.name()] = text->value();
+  }
+  return part;
+}
+
+void read_part_pixels(Imf::MultiPartInputFile& input, int index, ExrPart& part) {
+  const auto channels = static_cast<std::size_t>(part.channels), width = static_cast<std::size_t>(part.width);
+  part.pixels.resize(width * static_cast<std::size_t>(part.height) * channels);
+  Imf::FrameBuffer frame;
+  for (std::size_t c = 0; c < channels; ++c) {
+    frame.insert(kChannels[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(part.pixels.data() + c),
+                                          channels * sizeof(float), width * channels * sizeof(float)));
+  }
+  Imf::InputPart from(input, index);
+  from.setFrameBuffer(frame);
+  from.readPixels(0, part.height - 1);
+}
+
+Result<std::vector<ExrPart>> read_parts(Span file, const std::string& name, const ExrLimits& limits) {
+  MemoryStream stream(file);
+  Imf::MultiPartInputFile input(stream, 0);
+  if (static_cast<std::size_t>(input.parts()) > limits.most_parts)
+    return fault("exr_unsupported", "The file has more than " + std::to_string(limits.most_parts) + " parts.", name);
+  std::vector<ExrPart> out;
+  std::uint64_t pixels = 0;
+  for (int i = 0; i < input.parts(); ++i) {
+    KILN_TRY(part, describe_part(input.header(i), name));
+    pixels += static_cast<std::uint64_t>(part.width) * static_cast<std::uint64_t>(part.height);
+    if (pixels > limits.most_pixels)
+      return fault("image_too_large", "The parts have more than " + std::to_string(limits.most_pixels) + " pixels.",
+                   name);
+    out.push_back(std::move(part));
+  }
+  for (int i = 0; i < input.parts(); ++i) read_part_pixels(input, i, out[static_cast<std::size_t>(i)]);
+  return out;
+}
+
 }  // namespace
+
+bool looks_like_exr_parts(Span file) {
+  return looks_like_exr(file) && file.size() >= 8 && file[4] == 2 && (file[5] & 0x10) != 0;
+}
+
+Result<std::vector<ExrPart>> read_exr_parts(Span file, const std::string& name, const ExrLimits& limits) {
+  if (!is_scanline_parts(file))
+    return fault("exr_unsupported", "Only multi-part files of plain scan lines are read here.", name);
+  try {
+    return read_parts(file, name, limits);
+  } catch (const std::exception&) {
+    return fault("exr_invalid", "The file cannot be read as OpenEXR.", name);
+  }
+}
 
 bool looks_like_exr(Span file) {
   return file.size() >= 4 && file[0] == 0x76 && file[1] == 0x2F && file[2] == 0x31 && file[3] == 0x01;

@@ -14,6 +14,6 @@ kiln_library(kiln_import
           image_header.cpp image_decode.cpp png_decode.cpp jpeg_decode.cpp
           clean_part.cpp assemble.cpp ply_reader.cpp ply_scene.cpp
           import_scene.cpp read_scene_files.cpp
-          hdr_reader.cpp exr_reader.cpp import_environment.cpp
+          hdr_reader.cpp exr_reader.cpp exr_writer.cpp import_environment.cpp
   LINKS kiln_scene kiln_mesh kiln_base nlohmann_json::nlohmann_json
   PRIVATE_LINKS kiln_tinygltf draco::draco meshoptimizer::meshoptimizer OpenEXR::OpenEXR PNG::PNG JPEG::JPEG)

@@ -12,6 +12,7 @@
 #include "core/bake/certificate.h"
 #include "core/bake/checkpoint.h"
 #include "core/bake/compression.h"
+#include "core/bake/grid_step.h"
 #include "core/bake/job_light.h"
 #include "core/bake/lightings.h"
 #include "core/bake/plan.h"
@@ -43,8 +44,9 @@ Result<void> check_memory(const Plan& plan, const Limits& limits) {
   return fault("memory_limit",
                "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
                    " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
-                   (plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
-                                   : "lower /steps/0/subdivide/triangles or /steps/0/order") +
+                   (plan.grid        ? "lower /steps/0/resolution"
+                    : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
+                                     : "lower /steps/0/subdivide/triangles or /steps/0/order") +
                    ", or raise the limit");
 }
 
@@ -87,8 +89,10 @@ Effort effort_of(const Recipe& recipe) {
 }
 
 Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
-  if (!recipe.radiosity) return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
-  return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, light ? &*light : nullptr, threads);
+  const Environment* sky = light ? &*light : nullptr;
+  if (recipe.grid) return make_grid_plan(scene, recipe, sky, threads);
+  if (recipe.radiosity) return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, sky, threads);
+  return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
 }
 
 /// The delivered file, read back, with the input's pixels so that textures show in the preview, and its warnings
@@ -109,7 +113,24 @@ struct Pass {
   BakedScene decoded;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
+  std::optional<GridOutcome> grid;
 };
+
+/// The step `radiosity`, and where the plan has one the grid that looks at its surface.
+Result<Transfer> solve_light(const BakeInput& input, Scene& scene, const Environment* sky, Plan& plan,
+                             std::optional<GridOutcome>& grid, BakeLog& log, Threads& threads) {
+  plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
+  Result<GridOutcome> outcome;
+  const auto bake_grid = [&](const Tracer& tracer, const LitSurface* surface) {
+    const GatherFaces faces(tracer.scene());
+    const SphereGather::World world{tracer, faces, surface, sky};
+    outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
+  };
+  Transfer transfer = solve_radiosity_step(scene, plan, sky, plan.grid ? OnLit(bake_grid) : OnLit{}, log, threads);
+  if (!outcome) return tl::make_unexpected(outcome.error());
+  if (plan.grid) grid = std::move(*outcome);
+  return transfer;
+}
 
 /// Leaves the refined surface in `scene`.
 Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional<Environment>& light, Plan plan,
@@ -119,8 +140,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   Transport transport;
   if (plan.radiosity) {
     if (light) own.name = light->name;
-    plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
-    transport.transfer = solve_radiosity_step(scene, plan, light ? &*light : nullptr, log, threads);
+    KILN_TRY(transfer, solve_light(input, scene, light ? &*light : nullptr, plan, pass.grid, log, threads));
+    transport.transfer = std::move(transfer);
   } else {
     if (light) own = {light->name, project_environment(*light, plan.order)};
     transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
@@ -140,7 +161,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     const Tracer truth(scene, threads);
     pass.certificate =
         certify(decoded, truth, light,
-                {.bake_rays = log.rays(), .thorough = bool{input.recipe.promise}, .seed = input.recipe.seed}, threads);
+                {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed},
+                threads);
     if (!plan.radiosity)
       pass.sources = split_error(*pass.certificate, decoded, transport.noise, storage, plan.tail_left);
   }
@@ -180,7 +202,7 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
 Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optional<Environment>& light, Plan plan,
                          Passes& passes, const Checkpoints& checkpoints, BakeLog& log, Threads& threads) {
   constexpr double kFirst = 0.06, kLast = 0.97, kShare = 0.6;  // of what is left of the progress, for each pass
-  if (!input.recipe.promise) {
+  if (!input.recipe.promise || plan.grid) {  // a grid has passes of its own
     log.share(0, kLast);
     return bake_pass(input, scene, light, std::move(plan), log, threads);
   }
@@ -223,7 +245,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
-  const PrtStep step = input.recipe.radiosity ? PrtStep{} : input.recipe.steps.front();
+  const PrtStep step = input.recipe.steps.empty() ? PrtStep{} : input.recipe.steps.front();
   Passes passes(input.recipe.promise, step, input.recipe.limits);
   KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, checkpoints, log, threads));
 
@@ -245,9 +267,11 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .rank = pass.rank,
                                           .certificate = pass.certificate,
                                           .sources = pass.sources,
+                                          .grid = pass.grid,
                                           .passes = passes});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});
+  if (pass.grid) output.files.push_back({"grid.exr", "image/x-exr", std::move(pass.grid->file)});
   output.files.push_back({"preview.png", "image/png", std::move(preview)});
   output.files.push_back({"report.json", "application/json", to_bytes(report)});
   output.files.push_back(

@@ -24,7 +24,8 @@ struct BakeInput {
   std::string environment_name;
 };
 
-/// Named files with their media types: scene.glb, preview.png, report.json, log.txt.
+/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png, report.json,
+/// log.txt.
 struct ArtifactFile {
   std::string name;
   std::string media_type;

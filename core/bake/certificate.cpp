@@ -8,6 +8,7 @@
 
 #include "core/artifact/evaluate.h"
 #include "core/bake/lightings.h"
+#include "core/bake/spending.h"
 #include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
@@ -17,9 +18,6 @@
 
 namespace kiln {
 namespace {
-
-constexpr std::size_t kFewestPoints = 1024, kMostPoints = 8192;
-constexpr int kPilotSamples = 16;
 
 /// Points on the delivered surface and their places on the input's.
 struct Probe {
@@ -304,30 +302,6 @@ class Judge {
   ReferenceLight light_;
 };
 
-struct Spending {
-  std::size_t points = kFewestPoints;
-  int samples = 256;
-};
-
-/// A function of the scene and the bake's rays, never of time, so that reports repeat.
-Spending plan_spending(const ErrorStats& pilot, double rays_per_path, const CertificateOptions& options) {
-  constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
-  constexpr double kTenthSecond = 128 * kFewestPoints, kSecond = 1536 * kFewestPoints,
-                   kMostPaths = 4096 * kFewestPoints;
-  constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
-  // Rare gross errors, like a strip of floor under a column, are a thousandth of the surface and most of the error:
-  // where a promise hangs on it, enough points to meet some.
-  const double fewest = options.thorough ? 4.0 * kFewestPoints : 1.0 * kFewestPoints;
-  const double paths = std::clamp(kShare * static_cast<double>(options.bake_rays) / (kSingleRay * rays_per_path),
-                                  options.thorough ? kSecond : kTenthSecond, kMostPaths);
-  const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance
-  const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
-  Spending out;
-  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / fewest));
-  out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, fewest, double{kMostPoints}));
-  return out;
-}
-
 }  // namespace
 
 Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::optional<Environment>& environment,
@@ -341,14 +315,14 @@ Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::o
   };
 
   Certificate pilot;
-  const Probe few = probe(kFewestPoints);
+  const Probe few = probe(Spending::kFewestPoints);
   pilot.points = few.truth.size();
-  const Judgement first = judge.judge(few, kPilotSamples, mix64(seed));
+  const Judgement first = judge.judge(few, Spending::kPilotSamples, mix64(seed));
   const Samples judged = judge.judged(first, few.weight, pilot);
   const ErrorStats known = compute_error({judged.shown, judged.truth, judged.noise, pilot.points, few.weight},
                                          {.seed = options.seed, .resamples = 1});
-  const double paths = static_cast<double>(std::max<std::size_t>(pilot.points, 1)) * kPilotSamples;
-  const Spending spending = plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options);
+  const double paths = static_cast<double>(std::max<std::size_t>(pilot.points, 1)) * Spending::kPilotSamples;
+  const Spending spending = plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options.bake_rays, options.thorough);
 
   Certificate out;
   const Probe many = probe(spending.points);

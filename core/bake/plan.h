@@ -9,6 +9,7 @@
 #include "core/bake/forecast.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
+#include "core/grid/bake_grid.h"
 #include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
 #include "core/scene/environment.h"
@@ -37,6 +38,7 @@ struct Plan {
   int raw_bits = 12;                   // of coefficients, where the encoding leaves them open
   double compression = 0.005;          // relRMSE that components may add
   std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
+  std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
   std::vector<Decision> decisions;
   PointCosts costs;
   Prediction prediction;

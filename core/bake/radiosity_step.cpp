@@ -196,9 +196,10 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality 
   return plan;
 }
 
-Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, BakeLog& log, Threads& threads) {
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const OnLit& lit, BakeLog& log,
+                              Threads& threads) {
   Radiosity params = *plan.radiosity;
-  log.begin("direct", 0.55);
+  log.begin("direct", plan.grid ? 0.3 : 0.55);
   {
     const Tracer tracer(scene, threads);
     const DirectLight light(tracer, sky, params.direct), rough(tracer, sky, params.direct.rough());
@@ -236,7 +237,7 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
     log.count_rays(rays);
   }
 
-  log.begin("bounces", 0.85);
+  log.begin("bounces", plan.grid ? 0.4 : 0.85);
   const Tracer tracer(scene, threads);
   const RadiosityResult r = solve_radiosity(tracer, sky, params, threads);
   log.count_rays(r.stats.direct_rays + r.stats.gather_rays);
@@ -246,6 +247,8 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
   decide(plan, "gathered", std::to_string(gathered) + " of " + std::to_string(placed) + " points",
          "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
              " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
+
+  if (lit) lit(tracer, r.surface.get());
 
   Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
   out.coefficients.reserve(3 * r.direct.size());

@@ -4,10 +4,12 @@
 // Result  a Transfer of order 0 whose only slot is that light.
 
 #include <cstdint>
+#include <functional>
 
 #include "core/bake/bake_log.h"
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
+#include "core/meshless/lit_surface.h"
 #include "core/prt/transfer.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
@@ -18,7 +20,10 @@ namespace kiln {
 /// direct light; reflected rays are priced as in forecast.h.
 Plan make_radiosity_plan(const Scene&, const RadiosityStep&, Quality, const Environment* sky, Threads&);
 
+/// Called while the solved surface stands: null where nothing is reflected.
+using OnLit = std::function<void(const Tracer&, const LitSurface*)>;
+
 /// Refines scene.mesh as planned and solves for the light at its vertices. Adds to plan.decisions what it found.
-Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, BakeLog&, Threads&);
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const OnLit&, BakeLog&, Threads&);
 
 }  // namespace kiln

@@ -12,6 +12,7 @@ using Errors = std::vector<FieldError>;
 using nlohmann::json;
 
 constexpr std::int64_t kMaxBudget = 50'000'000;
+constexpr int kMostGridSide = 512;
 constexpr std::int64_t kMaxExactInteger = 9'007'199'254'740'991;  // 2^53 - 1: what a JSON number holds everywhere
 
 bool is_sha256(const std::string& text) {
@@ -148,6 +149,33 @@ RadiosityStep read_radiosity(JsonFields& fields, const std::string& pointer, Err
   return step;
 }
 
+std::optional<std::array<int, 3>> read_resolution(JsonFields& fields) {
+  const json* field = fields.find("resolution");
+  if (!field || *field == "auto") return std::nullopt;
+  std::array<int, 3> size{};
+  bool good = field->is_array() && field->size() == 3;
+  for (std::size_t i = 0; good && i < 3; ++i) {
+    const json& n = (*field)[i];
+    good = n.is_number_integer() && n >= 1 && n <= kMostGridSide;
+    if (good) size[i] = n.get<int>();
+  }
+  if (good) return size;
+  fields.error("resolution", "must be auto or three whole numbers from 1 to 512", "auto, [x, y, z]");
+  return std::nullopt;
+}
+
+GridStep read_grid(JsonFields& fields) {
+  GridStep step;
+  step.resolution = read_resolution(fields);
+  constexpr GridContent kContents[] = {GridContent::indirect, GridContent::all};
+  constexpr GridBlend kBlends[] = {GridBlend::exact, GridBlend::paper};
+  if (const auto content = fields.word("content", {"indirect", "all"})) step.content = kContents[*content];
+  if (const auto blend = fields.word("blend", {"exact", "paper"})) step.blend = kBlends[*blend];
+  if (const auto n = fields.integer_or_auto("bounces", 0, 1000)) step.bounces = static_cast<int>(*n);
+  if (const auto n = fields.integer_or_auto("samples", 1, 65536)) step.samples = static_cast<int>(*n);
+  return step;
+}
+
 void read_steps(const json& value, Recipe& recipe, Errors& errors) {
   if (!value.is_array() || value.size() != 1) {
     errors.push_back({"/steps", "must be a list with one step", shown(value), "[{\"do\": \"prt\"}]"});
@@ -155,10 +183,11 @@ void read_steps(const json& value, Recipe& recipe, Errors& errors) {
   }
   JsonFields fields(value[0], "/steps/0", errors);
   if (!fields.find("do", true)) return;
-  const auto step = fields.word("do", {"prt", "radiosity"});
+  const auto step = fields.word("do", {"prt", "radiosity", "grid"});
   if (!step) return;
   if (*step == 0) recipe.steps.push_back(read_prt(fields, "/steps/0", errors));
   if (*step == 1) recipe.radiosity = read_radiosity(fields, "/steps/0", errors);
+  if (*step == 2) recipe.grid = read_grid(fields);
   fields.finish();
 }
 
@@ -192,6 +221,10 @@ void check_promise(const Recipe& recipe, Errors& errors) {
   }
   if (!recipe.certificate)
     errors.push_back({"/certificate", "must not be off: what /quality promises is what it proves", "false", "true"});
+  if (recipe.grid && recipe.grid->resolution) {
+    errors.push_back({"/quality", "leaves nothing to spend: the resolution of the grid is given", "",
+                      "a promise, or /steps/0/resolution"});
+  }
   for (const PrtStep& step : recipe.steps) {
     const bool split_fixed = step.subdivide.mode == PrtStep::Subdivision::Mode::off || step.subdivide.triangles;
     if (step.samples && split_fixed) {
@@ -309,6 +342,17 @@ json step_json(const RadiosityStep& step) {
           {"subdivide", subdivision_json(step.subdivide)}};
 }
 
+json step_json(const GridStep& step) {
+  json out = {{"do", "grid"},
+              {"resolution", "auto"},
+              {"content", step.content == GridContent::all ? "all" : "indirect"},
+              {"blend", step.blend == GridBlend::paper ? "paper" : "exact"},
+              {"bounces", or_auto(step.bounces)},
+              {"samples", or_auto(step.samples)}};
+  if (step.resolution) out["resolution"] = *step.resolution;
+  return out;
+}
+
 }  // namespace
 
 tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view text) {
@@ -340,6 +384,7 @@ std::string recipe_json(const Recipe& recipe) {
       {"steps", json::array()}};
   for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
   if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
+  if (recipe.grid) out["steps"].push_back(step_json(*recipe.grid));
   if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
   if (const json environment = environment_json(recipe.environment); !environment.is_null())
     out["environment"] = environment;
@@ -358,6 +403,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"overcast"}})"},
       {"radiosity", "Light of one job, all reflections, under a clear sky with sun: not relightable, small and quick",
        R"({"steps":[{"do":"radiosity"}],"environment":{"builtin":"clear"}})"},
+      {"grid", "Indirect light in a grid, for what moves in the scene; the scene itself lit as by radiosity",
+       R"({"steps":[{"do":"grid"}],"environment":{"builtin":"clear"}})"},
       {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},
   };
   return all;

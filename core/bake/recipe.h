@@ -1,6 +1,7 @@
 #pragma once
 // A recipe: what a user asks of a bake, parsed once into types. contract.md section 4 is its outside.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/grid/grid.h"
 #include "core/prt/subdivide.h"
 
 namespace kiln {
@@ -59,6 +61,15 @@ struct RadiosityStep {
   PrtStep::Subdivision subdivide;
 };
 
+/// Irradiance vectors over a lattice (core/grid/bake_grid.h), and the scene lit as by RadiosityStep.
+struct GridStep {
+  std::optional<std::array<int, 3>> resolution;  // vertices along x, y, z; auto when absent
+  GridContent content = GridContent::indirect;
+  GridBlend blend = GridBlend::exact;
+  std::optional<int> bounces;  // reflections
+  std::optional<int> samples;  // rays of a vertex
+};
+
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"
 
 /// What a bake must reach instead of a quality: the error its certificate proves, the time it may take, or whichever of
@@ -80,6 +91,7 @@ struct Recipe {
   EnvironmentChoice environment;
   std::vector<PrtStep> steps;              // one, or none where there is a
   std::optional<RadiosityStep> radiosity;  // step `radiosity`
+  std::optional<GridStep> grid;            // step `grid`
   Quality quality = Quality::standard;     // where nothing is promised
   Promise promise;
   std::uint64_t seed = 0;

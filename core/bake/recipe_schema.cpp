@@ -64,6 +64,17 @@ std::string recipe_schema() {
         "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "subdivide": {"$ref": "#/definitions/subdivide"}
       }
+    },
+    "grid": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "properties": {
+        "do": {"enum": ["grid"]},
+        "resolution": {"description": "vertices along x, y and z", "anyOf": [{"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "integer", "minimum": 1, "maximum": 512}}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "content": {"description": "indirect: reflected light; all: lamps and sky too", "enum": ["indirect", "all"], "default": "indirect"},
+        "blend": {"description": "exact: nine numbers a channel, right for light of three SH bands; paper: Pacanowski's twelve textures", "enum": ["exact", "paper"], "default": "exact"},
+        "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "samples": {"description": "rays of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+      }
     }
   },
   "properties": {
@@ -82,7 +93,7 @@ std::string recipe_schema() {
     },
     "steps": {
       "type": "array", "minItems": 1, "maxItems": 1, "default": [{"do": "prt"}],
-      "items": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}]}
+      "items": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}]}
     },
     "quality": {
       "default": "standard",

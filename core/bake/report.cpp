@@ -81,6 +81,56 @@ ordered_json certificate_object(const std::optional<Certificate>& certificate) {
   return out;
 }
 
+ordered_json grid_certificate_object(const std::optional<GridCertificate>& certificate) {
+  if (!certificate) return nullptr;
+  ordered_json out = error_object(certificate->error);
+  out["points"] = certificate->points;
+  out["samples"] = certificate->samples;
+  out["mean_light"] = certificate->mean_light;
+  out["dark"] = certificate->dark;
+  const GridSources& s = certificate->sources;
+  out["sources"] = {{"noise", s.noise}, {"storage", s.storage}, {"lattice", s.lattice}};
+  out["seconds"] = certificate->seconds;
+  return out;
+}
+
+ordered_json grid_pass_list(const GridOutcome& grid) {
+  ordered_json list = ordered_json::array();
+  for (const GridPass& p : grid.passes) {
+    list.push_back({{"size", p.size},
+                    {"rays", p.rays},
+                    {"seconds", p.seconds},
+                    {"relrmse", p.relrmse},
+                    {"interval", {p.low, p.high}}});
+  }
+  return list;
+}
+
+ordered_json grid_object(const GridOutcome& grid, const GridBake& params) {
+  return {{"size", grid.size},
+          {"spacing", {grid.spacing.x, grid.spacing.y, grid.spacing.z}},
+          {"blend", params.blend == GridBlend::exact ? "exact" : "paper"},
+          {"content", params.content == GridContent::indirect ? "indirect" : "all"},
+          {"rays_per_vertex", grid.rays},
+          {"rays", grid.stats.rays},
+          {"invalid_vertices", grid.stats.invalid},
+          {"moved_vertices", grid.stats.moved},
+          {"bytes", grid.file.size()},
+          {"passes", grid_pass_list(grid)},
+          {"certificate", grid_certificate_object(grid.certificate)}};
+}
+
+ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
+  ordered_json out;
+  if (promise.target_error) out["target_error"] = *promise.target_error;
+  if (promise.time_budget_s) out["time_budget_s"] = *promise.time_budget_s;
+  out["kept"] = grid.kept;
+  out["ended_by"] = grid.ended_by;
+  out["reason"] = grid.reason;
+  out["passes"] = grid_pass_list(grid);
+  return out;
+}
+
 ordered_json radiosity_parameters(const Plan& plan) {
   const Radiosity& r = *plan.radiosity;
   return {{"scheme", "rows"},
@@ -96,7 +146,11 @@ ordered_json radiosity_parameters(const Plan& plan) {
 }
 
 ordered_json parameters_object(const Plan& plan) {
-  if (plan.radiosity) return radiosity_parameters(plan);
+  if (plan.radiosity) {
+    ordered_json out = radiosity_parameters(plan);
+    if (plan.grid) out["grid"] = {{"size", plan.grid->size}, {"rays_per_vertex", plan.grid->rays}};
+    return out;
+  }
   constexpr const char* kMeasures[] = {"residual", "eq2", "eq3", "eq4"};
   return {{"order", plan.order},
           {"bounces", plan.bounces},
@@ -176,7 +230,10 @@ std::string report_json(const ReportInput& in) {
                       {"warnings", warning_list(in.input)},
                       {"certificate", certificate_object(in.certificate)}};
   if (in.sources) out["error_sources"] = sources_object(*in.sources);
-  if (in.recipe.promise) out["promise"] = promise_object(in.recipe.promise, in.passes);
+  if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
+  if (in.recipe.promise)
+    out["promise"] =
+        in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
   return text_of(out);
 }
 

@@ -7,6 +7,7 @@
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
+#include "core/bake/grid_outcome.h"
 #include "core/bake/plan.h"
 #include "core/bake/progressive.h"
 
@@ -25,6 +26,7 @@ struct ReportInput {
   std::size_t rank = 0;  // of the stored components; 0: raw
   const std::optional<Certificate>& certificate;
   const std::optional<ErrorSources>& sources;
+  const std::optional<GridOutcome>& grid;
   const Passes& passes;  // none where a quality was asked for
 };
 

@@ -114,7 +114,9 @@ BakedGrid bake_grid(const SphereGather::World& world, const GridBake& params, Th
   const std::vector<Vec3f> places = gather_places(grid.lattice, scene, threads);
   const SphereGather gather(world, params.content, params.rays, params.seed);
   std::vector<char> valid(places.size());
-  std::atomic<std::uint64_t> rays = 0, done = 0;
+  std::atomic<std::uint64_t> rays = 0;
+  std::mutex telling;
+  std::uint64_t done = 0;
   threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::uint64_t own = 0;
     for (std::size_t v = begin; v < end; ++v) {
@@ -123,6 +125,7 @@ BakedGrid bake_grid(const SphereGather::World& world, const GridBake& params, Th
       store(light.light, v, grid);
     }
     rays += own;
+    const std::lock_guard<std::mutex> one_at_a_time(telling);
     done += end - begin;
     if (params.progress) params.progress(done, places.size());
   });

@@ -26,7 +26,7 @@ struct GridBake {
   int rays = 512;       // of a vertex
   bool corners = true;  // find which corners count
   std::uint64_t seed = 0;
-  std::function<void(std::uint64_t done, std::uint64_t total)> progress = {};  // vertices; called from any thread
+  std::function<void(std::uint64_t done, std::uint64_t total)> progress = {};  // vertices; from any thread, one call at a time
 };
 
 struct GridStats {

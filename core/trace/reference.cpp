@@ -166,15 +166,16 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
   Vec3d weight{1, 1, 1};
   int depth = 0;
   for (;; ++depth) {
+    const bool counts = depth >= options_.from;
     const Vec3d local = cosine_hemisphere(numbers.pair(depth));
-    add_sky_samples(v, weight, depth, numbers, sum);
-    add_lamps(v, weight, depth, numbers, sum);
+    if (counts) add_sky_samples(v, weight, depth, numbers, sum);
+    if (counts) add_lamps(v, weight, depth, numbers, sum);
 
     const Vec3d w = normalized(basis_around(v.normal).to_world(local));
     const double density = std::max(local.z, 1e-30) / std::numbers::pi;
     const Hit hit = tracer_.closest(lifted(v), to_float(w), kFar);
     if (!hit) {
-      add_sky(w, density, weight, sum);
+      if (counts) add_sky(w, density, weight, sum);
       break;
     }
 
@@ -183,7 +184,7 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
     if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) break;
     const double side = hit.back ? -1 : 1;
     const Vec3d face = to_double(p.geometric_normal) * side;
-    if (light_.scene_lights && emitters_.density(hit.triangle) > 0) {
+    if (counts && light_.scene_lights && emitters_.density(hit.triangle) > 0) {
       const double other =
           emitters_.density(hit.triangle) * double{hit.t} * double{hit.t} / std::max(1e-12, std::abs(dot(w, face)));
       sum.back() += times(weight, emission_at(scene_, p)) * (density / (density + other));

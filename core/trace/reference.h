@@ -41,6 +41,7 @@ struct ReferenceLight {
 struct ReferenceOptions {
   int samples = 1024;  // per point; rounded up to an even number
   int bounces = -1;    // -1: until Russian roulette ends the path (unbiased); 0: direct only
+  int from = 0;        // reflections that light must have made to count: 1 leaves direct light out
   std::uint64_t seed = 0;
 };
 

@@ -90,6 +90,20 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
   }
 }
 
+/// Without a lattice: gathered where it is looked at. What is left is the blend, the rays and the lit surface.
+void run_floor(const Case& c, const LitSurface& surface, int rays) {
+  const SphereGather gather({c.tracer, surface.faces(), &surface, nullptr}, GridContent::indirect, rays, 0);
+  std::uint64_t sent = 0, item = 0;
+  for (const float lift : {1e-4F, 2e-3F}) {
+    report(c, "gathered at the place, lifted " + std::to_string(lift), "", [&](const Vec3f& p, const Vec3f& n) {
+      return exact_irradiance(exact_parts(gather.at(p + n * lift, item++, sent).light), n);
+    });
+    report(c, "six vectors there, paper blend", "", [&](const Vec3f& p, const Vec3f& n) {
+      return paper_irradiance(gather.at(p + n * lift, item++, sent).light, n);
+    });
+  }
+}
+
 /// Rays of a vertex alone, without looking at what they hit: what Embree could do at most.
 void run_rate(const Case& c, const LitSurface& surface, int longest, int rays, Threads& threads) {
   const Box box = box_of(c.tracer.scene().mesh);
@@ -146,6 +160,7 @@ int main(int argc, char** argv) {
     const RadiosityResult light = solve_radiosity(tracer, nullptr, {}, threads);
     std::fprintf(stderr, "radiosity %.2f s\n", since(start));
     const Case c{turned ? "cornell rotated" : "cornell", tracer, *set, truth};
+    run_floor(c, *light.surface, rays);
     for (const int side : sides) run(c, *light.surface, side, rays, threads);
     if (!turned) run_rate(c, *light.surface, sides.back(), rays, threads);
   }

@@ -1,0 +1,202 @@
+#include "core/bake/grid_step.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/artifact/grid_exr.h"
+#include "core/bake/radiosity_step.h"
+
+namespace kiln {
+namespace {
+
+/// What the qualities spend. Measured on the Cornell reference: README.md of core/grid.
+struct GridEffort {
+  const char* reason;
+  int longest;  // vertices along the longest side
+  int rays;     // of a vertex
+};
+
+GridEffort grid_effort(const Recipe& recipe) {
+  if (recipe.promise) return {"the first pass", kFirstLongest, recipe.promise.target_error.value_or(0) < 0.03 ? 1024 : 512};
+  switch (recipe.quality) {
+    case Quality::draft:
+      return {"the draft quality", 16, 256};
+    case Quality::standard:
+      return {"the standard quality", 32, 512};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 64, 1024};
+}
+
+void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
+  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
+}
+
+std::string text_of(const std::array<int, 3>& size) {
+  return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);
+}
+
+std::string percent(double x) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%.2g %%", 100 * x);
+  return out;
+}
+
+double vertices_of(const std::array<int, 3>& size) { return double(size[0]) * size[1] * size[2]; }
+
+std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
+
+/// Seconds of one ray of a gather: some of the planned ones, sent from all over the lattice. What they would read where
+/// they land costs as much again (kiln_grid_bench).
+double seconds_a_ray(const Tracer& tracer, const GridBake& bake, Threads& threads) {
+  constexpr std::size_t kVertices = 64;
+  constexpr double kReading = 2;
+  const Box box = box_of(tracer.scene().mesh);
+  const Lattice lattice = lattice_over(box.low, box.high, bake.size);
+  const GatherFaces faces(tracer.scene());
+  const SphereGather gather({tracer, faces}, bake.content, 256, 1);
+  std::vector<std::uint64_t> rays(kVertices);
+  const auto start = std::chrono::steady_clock::now();
+  threads.for_blocks(kVertices, 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t v = i * lattice.vertices() / kVertices;
+      gather.at(to_float(lattice.position(lattice.vertex(v))), v, rays[i]);
+    }
+  });
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  double sent = 0;
+  for (const std::uint64_t n : rays) sent += static_cast<double>(n);
+  return kReading * seconds / std::max(1.0, sent);
+}
+
+/// Adds a grid of one size to a prediction. Bytes and memory by vertices, as measured by grid_bake_test.
+void add_prediction(Prediction& out, const GridBake& bake, double price) {
+  const double vertices = vertices_of(bake.size), numbers = 3 * static_cast<double>(part_count(bake.blend));
+  const double rays = vertices * bake.rays;
+  out.rays += whole(rays);
+  out.seconds += price * rays + 2e-6 * vertices;
+  out.memory_bytes += whole(vertices * (16 * numbers + 64));
+  out.artifact_bytes += whole(6000 + vertices * (1.75 * numbers + 2));
+}
+
+struct Baked {
+  BakedGrid grid;
+  Bytes file;
+  Grid decoded;
+};
+
+Result<Baked> bake_and_reopen(const GridTask& task, const GridBake& params, Threads& threads) {
+  Baked out{.grid = bake_grid(task.world, params, threads), .file = {}, .decoded = {}};
+  out.file = write_grid_exr(out.grid.grid, task.world.tracer.scene().frame, task.provenance);
+  KILN_TRY(decoded, read_grid_exr(out.file, "grid.exr"));
+  out.decoded = std::move(decoded);
+  return out;
+}
+
+/// Why there is no further pass, or nothing where there is one. `seconds` is what the whole bake has taken so far.
+struct Ending {
+  bool kept = false;
+  std::string ended_by, reason;
+};
+
+std::optional<Ending> ending_of(const Recipe& recipe, const GridPass& last, const std::array<int, 3>& next,
+                                std::uint64_t next_memory, double seconds) {
+  const Promise& promise = recipe.promise;
+  const std::string reached = "the grid of " + text_of(last.size) + " vertices has an error of at most " + percent(last.high);
+  if (promise.target_error && last.high <= *promise.target_error) return Ending{true, "target_met", reached};
+  const double then = seconds + last.seconds * vertices_of(next) / vertices_of(last.size);
+  if (promise.time_budget_s && then > *promise.time_budget_s)
+    return Ending{true, "time_spent", reached + "; the next finer one would not fit the time"};
+  const bool kept = !promise.target_error;
+  if (then > recipe.limits.wall_s) return Ending{kept, "floor", reached + "; the next finer one would not fit limits.wall_s"};
+  if (*std::max_element(next.begin(), next.end()) > kMostLongest)
+    return Ending{kept, "floor", reached + "; finer ones are not baked"};
+  if (next_memory > recipe.limits.memory_mb << 20)
+    return Ending{kept, "floor", reached + "; the next finer one would not fit limits.memory_mb"};
+  return std::nullopt;
+}
+
+}  // namespace
+
+Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
+  const GridStep& step = *recipe.grid;
+  const Quality surface = recipe.promise ? Quality::standard : recipe.quality;
+  Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, surface, sky, threads);
+  const GridEffort effort = grid_effort(recipe);
+  const Box box = box_of(scene.mesh);
+  plan.grid = GridBake{.size = step.resolution.value_or(even_size(box.low, box.high, effort.longest)),
+                       .blend = step.blend,
+                       .content = step.content,
+                       .rays = step.samples.value_or(effort.rays)};
+  const GridBake& grid = *plan.grid;
+  const std::string asked = "asked for by the recipe";
+  decide(plan, "resolution", text_of(grid.size),
+         step.resolution     ? asked
+         : recipe.promise ? "the first pass; doubled until the promise is kept"
+                             : effort.reason + std::string(" has ") + std::to_string(effort.longest) +
+                                   " vertices along the longest side");
+  decide(plan, "content", step.content == GridContent::all ? "all" : "indirect",
+         step.content == GridContent::all ? "lamps and sky are in the grid too"
+                                          : "direct light is left to the renderer, which knows it sharper");
+  decide(plan, "blend", step.blend == GridBlend::exact ? "exact" : "paper",
+         step.blend == GridBlend::exact ? "right for light of three SH bands, in 54 bytes a vertex"
+                                        : "as in the paper, in 72 bytes a vertex: constant light comes back as little as .577");
+  decide(plan, "grid rays", std::to_string(grid.rays), step.samples ? asked : effort.reason);
+  if (step.bounces == 0 && step.content == GridContent::indirect)
+    decide(plan, "grid light", "none", "no reflections were asked for, and direct light is not in this grid");
+  const Tracer tracer(scene, threads);
+  add_prediction(plan.prediction, grid, seconds_a_ray(tracer, grid, threads));
+  return plan;
+}
+
+Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& log, Threads& threads) {
+  GridOutcome out;
+  const Box box = box_of(task.world.tracer.scene().mesh);
+  GridBake params = *plan.grid;
+  params.seed = task.recipe.seed;
+  params.progress = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
+  double share = 0.6;
+  for (int longest = kFirstLongest;; longest *= 2) {
+    const double before = log.seconds();
+    log.begin("grid " + text_of(params.size), share);
+    KILN_TRY(baked, bake_and_reopen(task, params, threads));
+    log.count_rays(baked.grid.stats.rays);
+    GridPass pass{.size = params.size, .rays = baked.grid.stats.rays};
+    if (task.recipe.certificate) {
+      log.begin("grid certificate", share + 0.02);
+      const bool thorough = bool{task.recipe.promise};
+      out.certificate =
+          certify_grid({baked.decoded, baked.grid, task.world, params, plan.radiosity->bounces, thorough}, threads);
+      const ErrorStats& error = out.certificate->error;
+      pass.relrmse = error.relrmse, pass.low = error.interval_low, pass.high = error.interval_high;
+      log.know_error(error.relrmse);
+    }
+    pass.seconds = log.seconds() - before;
+    out.passes.push_back(pass);
+    out.file = std::move(baked.file);
+    out.size = params.size;
+    out.rays = params.rays;
+    out.spacing = baked.decoded.lattice.spacing;
+    out.stats = baked.grid.stats;
+    if (!task.recipe.promise) break;
+    const std::array<int, 3> next = even_size(box.low, box.high, 2 * longest);
+    GridBake finer = params;
+    finer.size = next;
+    Prediction more;
+    add_prediction(more, finer, 0);
+    if (const auto ending = ending_of(task.recipe, pass, next, more.memory_bytes, log.seconds())) {
+      out.kept = ending->kept, out.ended_by = ending->ended_by, out.reason = ending->reason;
+      break;
+    }
+    params.size = next;
+    share += 0.5 * (0.85 - share);
+  }
+  plan.grid->size = params.size;
+  decide(plan, "grid vertices", std::to_string(out.stats.invalid) + " inside solids, " + std::to_string(out.stats.moved) + " moved",
+         "those inside are filled from their neighbours, those on a surface gather beside it");
+  return out;
+}
+
+}  // namespace kiln
