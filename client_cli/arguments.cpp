@@ -139,7 +139,7 @@ void add_inspect(Program& program) {
 void add_eval(Program& program) {
   const auto command = add_command<EvalOptions>(program, "eval", "Light values from an artefact at points");
   auto& fields = *command.fields;
-  command.parser->add_option("file", fields.file, "scene.glb of a bake")->required()->type_name("FILE");
+  command.parser->add_option("file", fields.file, "scene.glb or grid.exr of a bake")->required()->type_name("FILE");
   command.parser->add_option("--points", fields.points, "CSV x,y,z,nx,ny,nz[,vx,vy,vz]; - is stdin")
       ->required()
       ->type_name("P.csv");
@@ -167,6 +167,7 @@ void add_reference(Program& program) {
   command.parser->add_option("--bounces", fields.bounces, "reflections; -1: all")
       ->check(CLI::Range(-1, 1000))
       ->type_name("N");
+  command.parser->add_flag("--indirect", fields.indirect, "reflected light only, as a grid holds it");
   command.parser->add_option("--sh-order", fields.sh_order, "projects the light to this order first; 0: full detail")
       ->check(CLI::Range(0, 10))
       ->type_name("N");

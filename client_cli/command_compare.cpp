@@ -25,6 +25,8 @@ Outcome<Side> load_side(const std::string& path) {
     side.baked = std::move(baked);
     return side;
   }
+  if (kind_of(bytes) == FileKind::grid)
+    return fail(ExitCode::usage, "grid_needs_points", "is a grid: compare what `kiln eval` makes of it", path);
   if (kind_of(bytes) == FileKind::scene)
     return fail(ExitCode::rejected, "not_an_artefact", "is a scene without baked light", path);
   KILN_TRY(table, read_values(path));

@@ -1,14 +1,31 @@
 // kiln eval FILE --points P.csv: light values from an artefact, decoded exactly as delivered.
 #include "client_cli/commands.h"
+#include "client_cli/files.h"
 #include "client_cli/light_lookup.h"
 #include "client_cli/models.h"
 #include "client_cli/recipe_input.h"
 #include "client_cli/value_output.h"
 
 namespace kiln {
+namespace {
+
+Outcome<ExitCode> run_grid(const EvalOptions& options, const std::vector<QueryPoint>& points, Session& session) {
+  if (!options.light.name.empty() || options.scene_albedo) {
+    return fail(ExitCode::usage, "not_relightable", "is a grid of one job's light: leave out --env and --albedo",
+                options.file);
+  }
+  KILN_TRY(grid, load_grid(options.file));
+  say(grid.content == GridContent::indirect ? "reflected light of its job (a grid holds no direct light)"
+                                            : "all light of its job");
+  return write_values({points, grid_values(grid, points), false}, 1, options.output, session);
+}
+
+}  // namespace
 
 Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   KILN_TRY(points, read_points(options.points));
+  KILN_TRY(bytes, read_file(options.file));
+  if (kind_of(bytes) == FileKind::grid) return run_grid(options, points, session);
   KILN_TRY(baked, load_artefact(options.file));
   KILN_TRY(environment, load_light(options.light));
   if (environment && baked.transfer.order == 0) {

@@ -97,12 +97,23 @@ json light_facts(const BakedScene& baked) {
           {"exposure", baked.exposure}, {"provenance", json::parse(baked.provenance, nullptr, false)}};
 }
 
-json certificate_beside(const std::string& path) {
+json certificate_beside(const std::string& path, const char* pointer) {
   const auto report = (std::filesystem::path(path).parent_path() / "report.json").string();
   if (!file_exists(report)) return nullptr;
   const auto text = read_text(report);
   const json document = text ? json::parse(*text, nullptr, false) : json();
-  return document.is_object() && document.contains("certificate") ? document["certificate"] : json();
+  const json::json_pointer place(pointer);
+  return document.is_object() && document.contains(place) ? document[place] : json();
+}
+
+json grid_facts(const Grid& grid) {
+  const Vec3d &origin = grid.lattice.origin, &spacing = grid.lattice.spacing;
+  return {{"size", grid.lattice.size},
+          {"origin", {origin.x, origin.y, origin.z}},
+          {"spacing", {spacing.x, spacing.y, spacing.z}},
+          {"blend", grid.blend == GridBlend::exact ? "exact" : "paper"},
+          {"content", grid.content == GridContent::indirect ? "indirect" : "all"},
+          {"corners", !grid.cells.empty()}};
 }
 
 json facts_of_json(std::string_view text) {
@@ -124,10 +135,18 @@ Outcome<json> facts_of(const std::string& path) {
     KILN_TRY(baked, load_artefact(path));
     facts["kind"] = "artefact";
     facts["light"] = light_facts(baked);
-    facts["certificate"] = certificate_beside(path);
+    facts["certificate"] = certificate_beside(path, "/certificate");
     facts.update(scene_facts(baked.scene));
     facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) /
                                 static_cast<double>(std::max<std::size_t>(1, baked.scene.mesh.position.size()));
+  } else if (kind_of(bytes) == FileKind::grid) {
+    KILN_TRY(grid, load_grid(path));
+    facts["kind"] = "grid";
+    facts["grid"] = grid_facts(grid);
+    facts["bytes_per_vertex"] =
+        static_cast<double>(bytes.size()) / static_cast<double>(grid.lattice.vertices());
+    facts["certificate"] = certificate_beside(path, "/grid/certificate");
+    return facts;
   } else {
     KILN_TRY(scene, load_scene(path));
     facts["kind"] = "scene";
@@ -160,9 +179,21 @@ std::string light_lines(const json& light) {
   return out;
 }
 
+std::string grid_text(const json& facts) {
+  const json& grid = facts["grid"];
+  return line("grid", grid["size"].dump() + " vertices, " + grid["spacing"].dump() + " apart from " +
+                          grid["origin"].dump()) +
+         line("light", grid["content"].get<std::string>() + ", " + grid["blend"].get<std::string>() + " blend" +
+                           (grid["corners"] == true ? ", corners that count" : "")) +
+         line("certificate", facts["certificate"].is_object()
+                                 ? certificate_text(json{{"certificate", facts["certificate"]}}.dump())
+                                 : "none beside this file");
+}
+
 std::string facts_text(const json& facts) {
   std::string out = line("file", facts["file"].get<std::string>() + " (" + facts["kind"].get<std::string>() + "), " +
                                      human_bytes(facts["bytes"].get<double>()));
+  if (facts.contains("grid")) return out + grid_text(facts);
   out += line("geometry", count(facts, "triangles") + ", " + count(facts, "vertices") + ", " + count(facts, "parts"));
   out += line("looks", count(facts, "materials") + ", " + count(facts, "textures") + ", " + count(facts, "lights") +
                            "; " + human_bytes(facts["image_bytes"].get<double>()) + " of images");

@@ -27,6 +27,7 @@ Outcome<ExitCode> run(const TruthOptions& options, Session& session) {
   const Places places = place_points(scene, points, threads);
   const TraceOptions trace{.samples = options.samples,
                            .bounces = options.bounces,
+                           .from = options.indirect ? 1 : 0,
                            .sh_order = options.sh_order,
                            .seed = options.seed,
                            .scene_albedo = options.scene_albedo};

@@ -87,6 +87,7 @@ Estimates trace_batches(const Tracer& tracer, std::span<const ReferencePoint> po
   ReferenceOptions batch;
   batch.samples = std::max(2, (options.samples + batches - 1) / batches);
   batch.bounces = options.bounces;
+  batch.from = options.from;
   Estimates estimates(points.size());
   for (int i = 0; i < batches; ++i) {
     batch.seed = mix64(options.seed ^ (std::uint64_t{0x7265666572} << 16)) + static_cast<std::uint64_t>(i);
@@ -121,6 +122,20 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
                               static_cast<float>(place->v)};
     const Vec3d value = to_double(value_at(baked.transfer, point, light));
     out.push_back(light_value(baked.scene, *place, value, {}, options.scene_albedo));
+  }
+  return out;
+}
+
+std::vector<LightValue> grid_values(const Grid& grid, std::span<const QueryPoint> points) {
+  std::vector<LightValue> out;
+  for (const QueryPoint& p : points) {
+    const double size = length(p.normal);
+    if (!(size > 0)) {
+      out.push_back(no_value());
+      continue;
+    }
+    const Vec3d irradiance = to_double(irradiance_at(grid, p.position, to_float(p.normal / size)));
+    out.push_back({irradiance, irradiance / std::numbers::pi, 0, {}, {}});
   }
   return out;
 }

@@ -12,6 +12,7 @@
 #include "client_cli/values.h"
 #include "core/artifact/baked_scene.h"
 #include "core/base/threads.h"
+#include "core/grid/grid.h"
 #include "core/mesh/closest_point.h"
 #include "core/scene/environment.h"
 
@@ -30,10 +31,14 @@ struct LookupOptions {
 std::vector<LightValue> artefact_values(const BakedScene&, const Places&, std::span<const Vec3f> light,
                                         const LookupOptions&);
 
+/// What a grid says of receivers in space: no surface is asked for, albedo is 1, distance 0. A zero normal has no value.
+std::vector<LightValue> grid_values(const Grid&, std::span<const QueryPoint>);
+
 /// The same quantity by path tracing, with standard errors from independent batches.
 struct TraceOptions {
   int samples = 1024;  // paths for each point, at least 2; rounded up to fill the batches
   int bounces = -1;    // -1: all
+  int from = 0;        // reflections that light must have made; 1: no direct light
   int sh_order = 0;    // > 0: the environment is projected to that order first
   std::uint64_t seed = 0;
   bool scene_albedo = false;

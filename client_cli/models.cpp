@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "client_cli/files.h"
+#include "core/artifact/grid_exr.h"
 
 namespace kiln {
 namespace {
@@ -36,6 +37,7 @@ std::string_view gltf_json(std::span<const std::uint8_t> bytes) {
 
 FileKind kind_of(std::span<const std::uint8_t> bytes) {
   if (gltf_json(bytes).find("\"KILN_radiance_transfer\"") != std::string_view::npos) return FileKind::artefact;
+  if (looks_like_grid(bytes)) return FileKind::grid;
   const bool scene = starts_with(bytes, "glTF") || starts_with(bytes, "ply") || !gltf_json(bytes).empty();
   return scene ? FileKind::scene : FileKind::text;
 }
@@ -59,6 +61,11 @@ Outcome<BakedScene> load_artefact(const std::string& path) {
   Result<BakedScene> baked = read_baked_glb(bytes);
   if (!baked && baked.error().where.empty()) baked.error().where = base_name(path);
   return or_failure(std::move(baked));
+}
+
+Outcome<Grid> load_grid(const std::string& path) {
+  KILN_TRY(bytes, read_file(path));
+  return or_failure(read_grid_exr(bytes, base_name(path)));
 }
 
 }  // namespace kiln

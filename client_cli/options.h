@@ -77,6 +77,7 @@ struct TruthOptions {
   std::string input, points, output;
   LightOptions light;
   bool scene_albedo = false;
+  bool indirect = false;  // reflected light only, as a grid holds it
   int samples = 1024, bounces = -1, sh_order = 0, threads = 0;
   std::uint64_t seed = 0;
 };

@@ -1,5 +1,6 @@
 #include "client_cli/report_text.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -41,6 +42,11 @@ std::string error_text(const json& error) {
     out += " (95 % interval " + percent_text(interval[0].get<double>()) + " .. " +
            percent_text(interval[1].get<double>()) + ")";
   return out;
+}
+
+json grid_certificate(const json& document) {
+  const json::json_pointer place("/grid/certificate");
+  return document.contains(place) ? document[place] : json();
 }
 
 std::string prediction_text(const json& plan) {
@@ -94,6 +100,8 @@ std::string certificate_text(std::string_view report) {
            " points): " + error_text(certificate["seen"]);
   if (certificate.contains("job_light") && certificate["job_light"].is_object())
     out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
+  if (const json grid = grid_certificate(document); grid.is_object())
+    out += "\nof the grid, at " + count(number_of(grid, "points")) + " points of the surface: " + error_text(grid);
   return out;
 }
 
@@ -123,7 +131,7 @@ std::optional<double> certified_error(std::string_view report) {
   if (!document.contains("certificate") || !document["certificate"].is_object()) return std::nullopt;
   const json& certificate = document["certificate"];
   if (!certificate.contains("relrmse") || !certificate["relrmse"].is_number()) return std::nullopt;
-  return certificate["relrmse"].get<double>();
+  return std::max(certificate["relrmse"].get<double>(), number_of(grid_certificate(document), "relrmse"));
 }
 
 }  // namespace kiln

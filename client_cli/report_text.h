@@ -25,7 +25,7 @@ std::string promise_text(std::string_view report_json);
 /// False only where a promise was made and could not be kept.
 bool promise_kept(std::string_view report_json);
 
-/// relRMSE of a report's certificate; nothing when it has none.
+/// relRMSE of a report's certificate, or of its grid's where that is larger; nothing when it has none.
 std::optional<double> certified_error(std::string_view report_json);
 
 }  // namespace kiln

@@ -23,12 +23,19 @@ inline constexpr std::size_t kDirections = 6;
 /// RGB, each a vector: vector[direction][channel].
 struct IrradianceVectors {
   std::array<std::array<Vec3f, 3>, kDirections> vector{};
+
+  IrradianceVectors& operator+=(const IrradianceVectors& other) {
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      for (std::size_t c = 0; c < 3; ++c) vector[d][c] += other.vector[d][c];
+    }
+    return *this;
+  }
 };
 
 /// Sums rays: L(w) dw is added to the octant of w, from which all six hemispheres are made.
 class OctantSums {
  public:
-  /// `light` is L(w) times the solid angle that this ray stands for.
+  /// `light` is L(w), up to the scale that vectors() takes: in the end each ray stands for light x scale.
   void add(const Vec3f& w, const Vec3f& light) {
     const int octant = (w.x < 0 ? 1 : 0) | (w.y < 0 ? 2 : 0) | (w.z < 0 ? 4 : 0);
     auto& sum = sums_[static_cast<std::size_t>(octant)];

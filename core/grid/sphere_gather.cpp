@@ -13,7 +13,8 @@ namespace kiln {
 namespace {
 
 constexpr int kSets = 8;
-constexpr double kUniform = std::numbers::inv_pi / 4;  // density of the sphere's rays
+constexpr float kSphere = 4 * std::numbers::pi_v<float>;  // its solid angle
+constexpr double kUniform = std::numbers::inv_pi / 4;      // density of the sphere's rays
 
 /// A random rotation: the local z axis anywhere, then any azimuth.
 LocalFrame turned(const DirectionSets& sets, std::uint64_t seed, std::uint64_t item) {
@@ -28,7 +29,7 @@ SphereGather::SphereGather(const World& world, GridContent content, int rays, st
     : world_(world),
       content_(content),
       seed_(mix64(seed ^ 0x67726964ULL)),
-      sets_(0, rays, kSets, seed_, 0, Spread::sphere),
+      sets_(0, rays, kSets, seed_, kFirstRays, Spread::sphere),
       emitters_(world.tracer.scene()) {
   if (content == GridContent::indirect || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
@@ -37,38 +38,51 @@ SphereGather::SphereGather(const World& world, GridContent content, int rays, st
 
 GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const {
   const LocalFrame frame = turned(sets_, seed_, item);
-  const float solid_angle = 4 * std::numbers::pi_v<float> / static_cast<float>(sets_.samples());
   Random random(seed_, item, 2);
   OctantSums sums;
-  int backs = 0;
+  Seen seen;
   Rays16 packet;
   Hits16 hits;
   packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z), packet.far.fill(kFar);
   for (int k = 0; k < sets_.samples() / kPacket; ++k) {
+    if (seen.rays == kFirstRays && seen.nothing()) break;  // inside a solid
     sets_.turn(frame.set, k, frame.basis, packet);
     world_.tracer.closest16(packet, hits);
+    rays += kPacket;
+    seen.rays += kPacket;
     for (std::size_t i = 0; i < kPacket; ++i) {
       const Vec3f w{packet.dx[i], packet.dy[i], packet.dz[i]};
-      Vec3f light;
-      if (hits.triangle[i] == kNoHit) {
-        if (content_ == GridContent::all) light = seen_sky(w);
-      } else if (world_.faces.side(hits.triangle[i], w) == HitSide::dark) {
-        ++backs;
-      } else {
-        const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
-        if (world_.surface != nullptr) light = world_.surface->reflected(hit, w, random, rays);
-        if (content_ == GridContent::all) light += seen_emitter(hit, w);
-      }
-      sums.add(w, light * solid_angle);
+      const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
+      sums.add(w, look_along(w, hit, random, seen, rays));
     }
   }
-  rays += static_cast<std::uint64_t>(sets_.samples());
+  GatheredLight out{sums.vectors(kSphere / static_cast<float>(seen.rays)),
+                    static_cast<float>(seen.backs) / static_cast<float>(seen.rays)};
   if (content_ == GridContent::all) {
-    add_lamps(place, item, sums, rays);
-    add_bright_sky(place, item, sums, rays);
-    add_emitters(place, item, sums, rays);
+    OctantSums direct;
+    add_lamps(place, direct, rays);
+    add_bright_sky(place, item, direct, rays);
+    add_emitters(place, item, direct, rays);
+    out.light += direct.vectors(1);
   }
-  return {sums.vectors(1), static_cast<float>(backs) / static_cast<float>(sets_.samples())};
+  return out;
+}
+
+/// What one ray of the sphere brings.
+Vec3f SphereGather::look_along(const Vec3f& w, const Hit& hit, Random& random, Seen& seen, std::uint64_t& rays) const {
+  const bool all = content_ == GridContent::all;
+  if (!hit) {
+    ++seen.open;
+    return all ? seen_sky(w) : Vec3f{};
+  }
+  if (world_.faces.side(hit.triangle, w) == HitSide::dark) {
+    ++seen.backs;
+    return {};
+  }
+  LitSurface::Reflected from{.light = {}, .known = true};
+  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, random, rays);
+  if (from.known) ++seen.open;
+  return all ? from.light + seen_emitter(hit, w) : from.light;
 }
 
 Vec3f SphereGather::seen_sky(const Vec3f& w) const {
@@ -86,7 +100,7 @@ Vec3f SphereGather::seen_emitter(const Hit& hit, const Vec3f& w) const {
   return emission_at(world_.tracer.scene(), p) * static_cast<float>(kUniform / (kUniform + other));
 }
 
-void SphereGather::add_lamps(const Vec3f& place, std::uint64_t, OctantSums& sums, std::uint64_t& rays) const {
+void SphereGather::add_lamps(const Vec3f& place, OctantSums& sums, std::uint64_t& rays) const {
   for (const Light& light : world_.tracer.scene().lights) {
     const LightArrival arrival = light_arrival(light, to_double(place));
     if (arrival.irradiance == Vec3d{}) continue;

@@ -4,7 +4,8 @@
 // Indirect L is what surfaces reflect (core/meshless/lit_surface.h): a ray costs its hit and one read of a table.
 // All      adds emitters and the sky, by the same rays and as many towards the emitters and the sky's bright parts,
 //          joined by the balance heuristic (Veach and Guibas 1995); punctual lights exactly.
-// Rays     stratified sets on the sphere, each place by a turn of its own
+// Rays     stratified sets on the sphere, each place by a turn of its own. A place of which the first kFirstRays meet
+//          neither sky nor a surface that light is known of is inside a solid and takes no more.
 // Error    that of N stratified rays and of the lit surface.   Repeat  a pure function of its arguments
 
 #include <cstdint>
@@ -40,9 +41,16 @@ class SphereGather {
   GatheredLight at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const;
 
  private:
+  static constexpr int kFirstRays = 4 * kPacket;  // a stratified set of their own
+  /// What the rays of a place met.
+  struct Seen {
+    int rays = 0, backs = 0, open = 0;  // open: the sky, or a surface that light is known of
+    bool nothing() const { return open == 0; }
+  };
+  Vec3f look_along(const Vec3f& w, const Hit&, Random&, Seen&, std::uint64_t& rays) const;
   Vec3f seen_sky(const Vec3f& w) const;
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
-  void add_lamps(const Vec3f& place, std::uint64_t item, OctantSums&, std::uint64_t& rays) const;
+  void add_lamps(const Vec3f& place, OctantSums&, std::uint64_t& rays) const;
   void add_bright_sky(const Vec3f& place, std::uint64_t item, OctantSums&, std::uint64_t& rays) const;
   void add_emitters(const Vec3f& place, std::uint64_t item, OctantSums&, std::uint64_t& rays) const;
 

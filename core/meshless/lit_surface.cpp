@@ -24,10 +24,11 @@ void LitSurface::set_light(std::vector<Vec3f> light) {
   light_ = std::move(light);
 }
 
-Vec3f LitSurface::reflected(const Hit& hit, const Vec3f& direction, Random& random, std::uint64_t& rays) const {
+LitSurface::Reflected LitSurface::reflected(const Hit& hit, const Vec3f& direction, Random& random,
+                                            std::uint64_t& rays) const {
   const SenderPaths::End end = paths_.follow(hit, direction, false, random, rays);
-  if (end.sender == Senders::kNone) return end.picked_up;
-  return end.picked_up + end.throughput * light_[end.sender];
+  if (end.sender == Senders::kNone) return {end.picked_up, false};
+  return {end.picked_up + end.throughput * light_[end.sender], true};
 }
 
 }  // namespace kiln

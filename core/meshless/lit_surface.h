@@ -28,7 +28,11 @@ class LitSurface {
   /// Of each point, in order.
   void set_light(std::vector<Vec3f> light);
   /// Equation 1: what is reflected (not emitted) against a ray that lands at `hit`. Adds the rays of paths to `rays`.
-  Vec3f reflected(const Hit& hit, const Vec3f& direction, Random&, std::uint64_t& rays) const;
+  struct Reflected {
+    Vec3f light;
+    bool known = false;  // some sender stands for the place, or for one that the path came to
+  };
+  Reflected reflected(const Hit& hit, const Vec3f& direction, Random&, std::uint64_t& rays) const;
 
  private:
   const Tracer& tracer_;
