@@ -103,6 +103,10 @@ export class Stage {
     this.controls.maxDistance = 30 * this.bounds.radius;
   }
 
+  get radius(): number {
+    return this.bounds.radius;
+  }
+
   get pose(): CameraPose {
     const { center, radius } = this.bounds;
     const place = this.camera.position.clone().sub(center).divideScalar(radius);

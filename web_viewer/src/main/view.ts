@@ -2,6 +2,7 @@
 
 import { artifact, artifactUrl, getReport, type Job, type Report } from '../asset/jobs';
 import type { RadianceTransferExtension } from '../asset/kiln_reader';
+import { download } from '../asset/download';
 import { parseGltf } from '../asset/parse_gltf';
 import type { Relighter } from '../light/relighter';
 import { announce, copyText, h, toast } from '../ui/dom';
@@ -66,7 +67,7 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
   const { stage, state } = viewer;
   const { id, area, main } = page;
   const help = helpDialog();
-  const panel = new ViewPanel(viewer, statistics(viewer, report));
+  const panel = new ViewPanel(viewer, statistics(viewer, report), artifact(job, 'grid.exr') !== undefined);
   const divider = new Divider(area, state);
   const legend = new LegendBox();
   const probe = new Probe(area, viewer);
@@ -90,8 +91,27 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     () => divider.dispose(),
     () => probe.dispose(),
   );
-  document.documentElement.dataset.ready = 'true';
+  void openGrid(page, viewer, job).then(() => (document.documentElement.dataset.ready = 'true'));
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
+}
+
+/// A grid that cannot be shown costs the page nothing else.
+async function openGrid(page: Page, viewer: Viewer, job: Job): Promise<void> {
+  if (!artifact(job, 'grid.exr')) return;
+  try {
+    const [file, { readGrid }, { GridView }, { dragBall }] = await Promise.all([
+      download(artifactUrl(job, 'grid.exr'), () => {}),
+      import('../asset/grid_file'),
+      import('./grid_view'),
+      import('./grid_drag'),
+    ]);
+    const grid = readGrid(file);
+    const view = new GridView(viewer, grid);
+    page.onDispose(dragBall(viewer, view), () => view.dispose());
+    Object.assign(window, { kilnGrid: view });
+  } catch (error) {
+    toast(`grid.exr cannot be shown: ${(error as Error).message}`, 'error');
+  }
 }
 
 function toolbar(viewer: Viewer, job: Job, actions: KeyActions): HTMLElement {

@@ -4,7 +4,7 @@
 import type { CameraPose } from './stage';
 
 export type ToneMap = 'baked' | 'neutral' | 'aces' | 'none';
-export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient';
+export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient' | 'grid';
 export type Background = 'off' | 'sky' | 'harmonics';
 
 export interface ViewState {
@@ -19,6 +19,10 @@ export interface ViewState {
   mode: Mode;
   channel: number;
   slot: number;
+  ball: boolean; // of a grid: see grid_view.ts
+  ballAt: readonly [number, number, number] | null; // from the middle of the grid, in its half extents
+  cells: boolean;
+  arrows: boolean;
   compare: number | null; // where the divider stands, 0 to 1; null: off
   pose: CameraPose | null; // null: the default view
 }
@@ -35,6 +39,10 @@ export const kDefaultState: ViewState = {
   mode: 'shaded',
   channel: 0,
   slot: 0,
+  ball: true,
+  ballAt: null,
+  cells: false,
+  arrows: false,
   compare: null,
   pose: null,
 };
@@ -66,6 +74,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     allowed.includes(from.get(key) as T) ? (from.get(key) as T) : (kDefaultState[key] as T);
   const flag = (key: keyof ViewState): boolean =>
     from.has(key) ? from.get(key) === 'true' : (kDefaultState[key] as boolean);
+  const ballAt = (from.get('ballAt') ?? '').split(',').map(Number);
   const pose = (from.get('pose') ?? '').split(',').map(Number);
   return {
     light: one('light', lights),
@@ -76,9 +85,13 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     tone: one<ToneMap>('tone', ['baked', 'neutral', 'aces', 'none']),
     background: one<Background>('background', ['off', 'sky', 'harmonics']),
     wire: flag('wire'),
-    mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient']),
+    mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient', 'grid']),
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
+    ball: flag('ball'),
+    ballAt: ballAt.length === 3 && ballAt.every((x) => Math.abs(x) <= 1) ? (ballAt as unknown as ViewState['ballAt']) : null,
+    cells: flag('cells'),
+    arrows: flag('arrows'),
     compare: from.has('compare') ? number('compare', 0, 1) : null,
     pose: pose.length === 6 && pose.every(Number.isFinite) ? (pose as unknown as CameraPose) : null,
   };

@@ -20,7 +20,7 @@ export type Legend = Pick<HeatMapData, 'map' | 'range'> | null;
 const kWellExposed = 0.877; // the bake's tone map shows it as 0.8 of white: its own target for bright surfaces
 const kOverexposed = 3 * kWellExposed;
 
-const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light';
+const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light' && mode !== 'grid';
 
 export class Viewer {
   onLegend: (legend: Legend) => void = () => {};

@@ -6,6 +6,7 @@ const kHelp: readonly [string, string][] = [
   ['Drag · arrow keys', 'orbit'],
   ['Right drag · Shift + arrow keys', 'pan'],
   ['Click', 'the number at that point'],
+  ['Drag the ball', 'through the light of a grid'],
   ['Wheel · pinch · Page Up, Page Down', 'zoom'],
   ['Shift + drag · [ and ]', 'turn the light'],
   ['+ and −', 'exposure'],

@@ -14,6 +14,7 @@ export class ViewPanel {
   constructor(
     private readonly viewer: Viewer,
     statistics: HTMLElement,
+    private readonly hasGrid: boolean,
   ) {
     this.controls = new Controls(viewer.state);
     this.element = h(
@@ -87,6 +88,7 @@ export class ViewPanel {
       { id: 'weighted', label: 'Where to refine, by area' },
       { id: 'coefficient', label: 'One coefficient' },
     ];
+    if (this.hasGrid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
     const { channels, slots } = viewer.model.transfer;
     const slot = h(
       'div',
@@ -100,7 +102,17 @@ export class ViewPanel {
       controls.select('mode', 'Surface', () => modes).element,
       slot,
       controls.checkbox('wire', 'Wireframe'),
+      ...(this.hasGrid ? this.grid() : []),
       compareSwitch(viewer, controls),
+    ];
+  }
+
+  private grid(): HTMLElement[] {
+    const { controls } = this;
+    return [
+      controls.checkbox('ball', 'A ball in the grid (drag it)'),
+      controls.checkbox('cells', 'Cells that a surface crosses'),
+      controls.checkbox('arrows', 'Where light flows'),
     ];
   }
 

@@ -1,0 +1,206 @@
+// What the viewer shows of an irradiance vector grid: surfaces lit by it alone, a ball that hangs in it, the boxes of the cells
+// of which not every corner counts, and an arrow at each vertex. Nothing is made before it is asked for.
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  LineBasicMaterial,
+  LineSegments,
+  DataUtils,
+  type Material,
+  Mesh,
+  ShaderMaterial,
+  SphereGeometry,
+  Vector3,
+} from 'three';
+import type { GridFile } from '../asset/grid_file';
+import { gridMaterial } from '../shaders/grid_material';
+import { GridTextures } from '../shaders/grid_textures';
+import type { Viewer } from './viewer';
+import type { ViewState } from './view_state';
+
+const kBallSize = 0.08; // of the model's radius
+
+interface Shown {
+  dispose(): void;
+}
+
+export class GridView {
+  ball: Mesh | null = null;
+  private readonly textures: GridTextures;
+  private readonly ballMaterial: ShaderMaterial;
+  private surfaces: Shown | null = null;
+  private boxes: Shown | null = null;
+  private arrows: Shown | null = null;
+  private readonly unsubscribe: () => void;
+
+  constructor(
+    private readonly viewer: Viewer,
+    readonly grid: GridFile,
+  ) {
+    this.textures = new GridTextures(grid);
+    this.ballMaterial = gridMaterial(this.textures, false);
+    this.unsubscribe = viewer.state.subscribe((state, changed) => this.apply(state, changed));
+    this.apply(viewer.state.get(), new Set<keyof ViewState>(['mode', 'ball', 'ballAt', 'cells', 'arrows']));
+  }
+
+  private apply(state: Readonly<ViewState>, changed: ReadonlySet<keyof ViewState>): void {
+    if (changed.has('mode')) this.surfaces = swap(this.surfaces, state.mode === 'grid', () => this.lightSurfaces());
+    if (changed.has('ball')) this.showBall(state.ball);
+    if (changed.has('ballAt') || changed.has('ball')) this.placeBall(state.ballAt);
+    if (changed.has('cells')) this.boxes = swap(this.boxes, state.cells, () => this.add(cellBoxes(this.grid)));
+    if (changed.has('arrows')) this.arrows = swap(this.arrows, state.arrows, () => this.add(vertexArrows(this.grid)));
+    this.viewer.stage.requestDraw();
+  }
+
+  /// The model's meshes with the grid's material in place of their own.
+  private lightSurfaces(): Shown {
+    const material = gridMaterial(this.textures, true);
+    const undo = this.viewer.model.parts.map(({ mesh }) => {
+      const own = mesh.material;
+      mesh.material = material;
+      return () => {
+        if (mesh.material === material) mesh.material = own;
+      };
+    });
+    return {
+      dispose: () => {
+        for (const step of undo) step();
+        material.dispose();
+      },
+    };
+  }
+
+  private showBall(shown: boolean): void {
+    if (shown === (this.ball !== null)) return;
+    if (!this.ball) {
+      this.ball = new Mesh(new SphereGeometry(kBallSize * this.viewer.stage.radius, 48, 32), this.ballMaterial);
+      this.viewer.stage.scene.add(this.ball);
+      return;
+    }
+    this.ball.removeFromParent();
+    this.ball.geometry.dispose();
+    this.ball = null;
+  }
+
+  /// `at` counts from the middle of the grid in its half extents; null: the middle.
+  private placeBall(at: ViewState['ballAt']): void {
+    const { middle, half } = extent(this.grid);
+    this.ball?.position.copy(new Vector3(...(at ?? [0, 0, 0])).multiply(half).add(middle));
+  }
+
+  /// Where a place of the world is in the terms of ViewState.ballAt: inside the grid's box.
+  ballAt(place: Vector3): [number, number, number] {
+    const { middle, half } = extent(this.grid);
+    const inside = place.clone().sub(middle).divide(half).clamp(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+    return [inside.x, inside.y, inside.z];
+  }
+
+  private add(lines: LineSegments): Shown {
+    this.viewer.stage.scene.add(lines);
+    return {
+      dispose: () => {
+        lines.removeFromParent();
+        lines.geometry.dispose();
+        (lines.material as Material).dispose();
+      },
+    };
+  }
+
+  dispose(): void {
+    this.unsubscribe();
+    this.showBall(false);
+    for (const shown of [this.surfaces, this.boxes, this.arrows]) shown?.dispose();
+    this.ballMaterial.dispose();
+    this.textures.dispose();
+  }
+}
+
+function swap(now: Shown | null, wanted: boolean, make: () => Shown): Shown | null {
+  if (wanted === (now !== null)) return now;
+  if (wanted) return make();
+  now?.dispose();
+  return null;
+}
+
+function extent({ size, origin, spacing }: GridFile): { middle: Vector3; half: Vector3 } {
+  const half = new Vector3(...spacing.map((s, a) => (s * size[a]) / 2));
+  return { half, middle: half.clone().add(new Vector3(...origin)).sub(new Vector3(...spacing).divideScalar(2)) };
+}
+
+/// Twelve edges for each cell of which not every corner counts everywhere.
+function cellBoxes(grid: GridFile): LineSegments {
+  const geometry = new InstancedBufferGeometry();
+  const corner = (b: number) => [b & 1, (b >> 1) & 1, (b >> 2) & 1];
+  const edges = [0, 1, 2].flatMap((axis) =>
+    [0, 1, 2, 3, 4, 5, 6, 7].filter((b) => !((b >> axis) & 1)).flatMap((b) => [...corner(b), ...corner(b | (1 << axis))]),
+  );
+  geometry.setAttribute('position', new BufferAttribute(Float32Array.from(edges), 3));
+  geometry.setAttribute('cell', new InstancedBufferAttribute(Float32Array.from(partialCells(grid)), 3));
+  const material = new ShaderMaterial({
+    vertexShader: /* glsl */ `
+attribute vec3 cell;
+uniform vec3 origin, spacing;
+void main() { gl_Position = projectionMatrix * viewMatrix * vec4(origin + spacing * (cell + position), 1.0); }`,
+    fragmentShader: 'void main() { gl_FragColor = vec4(0.15, 0.65, 1.0, 0.35); }',
+    uniforms: { origin: { value: new Vector3(...grid.origin) }, spacing: { value: new Vector3(...grid.spacing) } },
+    transparent: true,
+    depthWrite: false,
+  });
+  const lines = new LineSegments(geometry, material);
+  lines.frustumCulled = false; // its bounds are in the instances
+  return lines;
+}
+
+function partialCells({ corners, cells }: GridFile): number[] {
+  const out: number[] = [];
+  if (!corners) return out;
+  for (let i = 0; i < corners.length / 16; ++i) {
+    const bytes = corners.subarray(16 * i, 16 * i + 16);
+    const whole = bytes.every((b, k) => b === 255 || (k < 8 && b === 0));
+    if (!whole) out.push(i % cells[0], Math.floor(i / cells[0]) % cells[1], Math.floor(i / (cells[0] * cells[1])));
+  }
+  return out;
+}
+
+/// A line at each vertex along the net flux (Phi, its channels together), as long as the light is one-sided, in its colour.
+function vertexArrows(grid: GridFile): LineSegments {
+  const count = grid.size[0] * grid.size[1] * grid.size[2];
+  const [position, colour] = [new Float32Array(6 * count), new Float32Array(6 * count)];
+  const length = 0.9 * Math.min(...grid.spacing);
+  for (let v = 0; v < count; ++v) {
+    const { flux, light } = vertexLight(grid, v);
+    const at = [v % grid.size[0], Math.floor(v / grid.size[0]) % grid.size[1], Math.floor(v / (grid.size[0] * grid.size[1]))];
+    for (let a = 0; a < 3; ++a) {
+      const start = grid.origin[a] + at[a] * grid.spacing[a];
+      position[6 * v + a] = start;
+      position[6 * v + 3 + a] = start + length * flux[a];
+      colour[6 * v + 3 + a] = light[a];
+    }
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(position, 3));
+  geometry.setAttribute('color', new BufferAttribute(colour, 3));
+  return new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
+}
+
+/// Net flux over the flux from all sides (at most 1 in length), and the mean light over all directions.
+function vertexLight(grid: GridFile, v: number): { flux: number[]; light: number[] } {
+  const half = (part: number, c: number) => DataUtils.fromHalfFloat(grid.parts[part][4 * v + c]);
+  const sum = (part: number) => half(part, 0) + half(part, 1) + half(part, 2);
+  if (grid.blend === 'exact') {
+    const all = Math.max(1e-20, sum(3) + sum(4) + sum(5)) / 1.5; // integral of L |w_i| over the axes: 3/2 of that of L, if even
+    return {
+      flux: [0, 1, 2].map((a) => sum(a) / all),
+      light: [0, 1, 2].map((c) => (grid.scale * (half(3, c) + half(4, c) + half(5, c))) / (6 * Math.PI)),
+    };
+  }
+  const sides = [0, 1, 2, 3, 4, 5];
+  const all = Math.max(1e-20, sides.reduce((s, d) => s + sum(2 * d), 0)) / 1.5;
+  return {
+    flux: [0, 1, 2].map((a) => (sum(4 * a) - sum(4 * a + 2)) / all),
+    light: [0, 1, 2].map((c) => (grid.scale * sides.reduce((s, d) => s + half(2 * d, c), 0)) / (6 * Math.PI)),
+  };
+}

@@ -1,0 +1,143 @@
+// An irradiance vector grid as 3D textures, and the GLSL that reads them: the same look-up as asset/grid_file.ts.
+// Where all corners of a cell count the hardware interpolates; elsewhere eight texels are fetched by hand.
+
+import {
+  ClampToEdgeWrapping,
+  Data3DTexture,
+  HalfFloatType,
+  LinearFilter,
+  NearestFilter,
+  RGBAFormat,
+  RGBAIntegerFormat,
+  UnsignedIntType,
+  Vector3,
+} from 'three';
+import type { GridFile } from '../asset/grid_file';
+
+export class GridTextures {
+  readonly uniforms: Record<string, { value: unknown }>;
+  readonly defines: Record<string, string>;
+  private readonly textures: Data3DTexture[];
+
+  constructor(grid: GridFile) {
+    const parts = grid.parts.map((data) => {
+      const texture = new Data3DTexture(data, ...grid.size);
+      texture.format = RGBAFormat;
+      texture.type = HalfFloatType;
+      texture.minFilter = texture.magFilter = LinearFilter;
+      return texture;
+    });
+    const corners = new Data3DTexture(new Uint32Array(cornerWords(grid).buffer), ...grid.cells);
+    corners.format = RGBAIntegerFormat;
+    corners.type = UnsignedIntType;
+    corners.internalFormat = 'RGBA32UI';
+    corners.minFilter = corners.magFilter = NearestFilter;
+    this.textures = [...parts, corners];
+    for (const texture of this.textures) {
+      texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
+      texture.unpackAlignment = 4;
+      texture.needsUpdate = true;
+    }
+    this.uniforms = {
+      gridCorners: { value: corners },
+      gridOrigin: { value: new Vector3(...grid.origin) },
+      gridSpacing: { value: new Vector3(...grid.spacing) },
+      gridSize: { value: new Vector3(...grid.size) },
+      gridScale: { value: grid.scale },
+    };
+    parts.forEach((texture, i) => (this.uniforms[`gridPart${i}`] = { value: texture }));
+    this.defines = { GRID_PARTS: String(parts.length) };
+    if (grid.blend === 'paper') this.defines.GRID_PAPER = '';
+  }
+
+  dispose(): void {
+    for (const texture of this.textures) texture.dispose();
+  }
+}
+
+function cornerWords(grid: GridFile): Uint8Array {
+  if (grid.corners) return grid.corners;
+  return new Uint8Array(16 * grid.cells[0] * grid.cells[1] * grid.cells[2]).fill(255);
+}
+
+const kNumbers = (n: number) => Array.from({ length: n }, (_, i) => i);
+const declare = (n: number) => kNumbers(n).map((i) => `uniform sampler3D gridPart${i};`).join('\n');
+const readAll = (n: number) => kNumbers(n).map((i) => `  part[${i}] = gridRead(gridPart${i}, place);`).join('\n');
+
+/// vec3 gridIrradiance(vec3 p, vec3 n, bool surface): W m^-2, at least 0. `n` is unit; p is in the world.
+export const gridLookup = (parts: number): string => /* glsl */ `
+uniform highp usampler3D gridCorners;
+uniform vec3 gridOrigin, gridSpacing, gridSize;
+uniform float gridScale;
+${declare(parts)}
+
+struct GridPlace {
+  ivec3 cell;
+  vec3 at;       // in the textures, 0 to 1
+  float weight[8];
+  bool whole;    // every corner counts
+};
+
+uint gridByte(uvec4 words, int i) {
+  return (words[i >> 2] >> uint(8 * (i & 3))) & 255u;
+}
+
+uint gridBits(uvec4 words, vec3 f, vec3 n, bool surface) {
+  vec3 size = abs(n);
+  int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  uint bits = surface ? gridByte(words, 2 * axis + (n[axis] < 0.0 ? 1 : 0)) : 0u;
+  int eighth = (f.x >= 0.5 ? 1 : 0) + (f.y >= 0.5 ? 2 : 0) + (f.z >= 0.5 ? 4 : 0);
+  if (bits == 0u) bits = gridByte(words, 8 + eighth);
+  return bits == 0u ? 255u : bits;
+}
+
+GridPlace gridPlace(vec3 p, vec3 n, bool surface) {
+  GridPlace place;
+  vec3 t = clamp((p - gridOrigin) / gridSpacing, vec3(0.0), gridSize - 1.0);
+  place.cell = clamp(ivec3(floor(t)), ivec3(0), max(ivec3(0), ivec3(gridSize) - 2));
+  place.at = (t + 0.5) / gridSize;
+  vec3 f = t - vec3(place.cell);
+  uint bits = gridBits(texelFetch(gridCorners, place.cell, 0), f, n, surface);
+  place.whole = bits == 255u;
+  if (place.whole) return place;
+  float sum = 0.0;
+  for (int b = 0; b < 8; ++b) {
+    vec3 up = vec3(b & 1, (b >> 1) & 1, (b >> 2) & 1);
+    vec3 w = mix(1.0 - f, f, up);
+    place.weight[b] = ((bits >> uint(b)) & 1u) == 0u ? 0.0 : w.x * w.y * w.z + 1e-4;
+    sum += place.weight[b];
+  }
+  for (int b = 0; b < 8; ++b) place.weight[b] /= sum;
+  return place;
+}
+
+vec3 gridRead(sampler3D part, GridPlace place) {
+  if (place.whole) return textureLod(part, place.at, 0.0).rgb;
+  vec3 value = vec3(0.0);
+  for (int b = 0; b < 8; ++b) {
+    if (place.weight[b] == 0.0) continue;
+    ivec3 corner = min(place.cell + ivec3(b & 1, (b >> 1) & 1, (b >> 2) & 1), ivec3(gridSize) - 1);
+    value += place.weight[b] * texelFetch(part, corner, 0).rgb;
+  }
+  return value;
+}
+
+vec3 gridIrradiance(vec3 p, vec3 n, bool surface) {
+  GridPlace place = gridPlace(p, n, surface);
+  vec3 part[GRID_PARTS];
+${readAll(parts)}
+  vec3 e = vec3(0.0);
+#ifdef GRID_PAPER
+  for (int axis = 0; axis < 3; ++axis) {
+    int d = 2 * axis + (n[axis] < 0.0 ? 1 : 0);
+    vec3 direction = part[2 * d + 1];
+    direction /= max(length(direction), 1e-20);
+    e += n[axis] * n[axis] * max(0.0, dot(direction, n)) * part[2 * d];
+  }
+#else
+  e = 0.5 * (n.x * part[0] + n.y * part[1] + n.z * part[2]) +
+      0.5 * (n.x * n.x * part[3] + n.y * n.y * part[4] + n.z * n.z * part[5]) +
+      0.25 * (n.x * n.y * part[6] + n.x * n.z * part[7] + n.y * n.z * part[8]);
+#endif
+  return gridScale * max(e, vec3(0.0));
+}`;
