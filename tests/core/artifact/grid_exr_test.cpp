@@ -89,7 +89,9 @@ TEST(GridExr, DamagedFilesAreRefusedOrReadAndNeverMore) {
     for (int k = 0; k < 4 && !bad.empty(); ++k) bad[random.next() % std::min<std::size_t>(bad.size(), 4096)] ^= 0x41;
     const auto read = read_grid_exr(bad, "grid.exr");
     if (!read) ++refused;
-    if (read) EXPECT_EQ(read->parts.size(), 9U);
+    if (read) {
+      EXPECT_EQ(read->parts.size(), 9U);
+    }
   }
   EXPECT_GT(refused, 200U);
 }

@@ -111,5 +111,28 @@ TEST(Recipe, PromisesNothingOfRadiosity) {
             (std::vector<std::string>{"/quality"}));
 }
 
+TEST(Recipe, OfAGridHasItsOwnParametersAndSurvivesARoundTrip) {
+  const auto recipe = parse_recipe(
+      R"({"steps":[{"do":"grid","resolution":[4,5,6],"content":"all","blend":"paper","bounces":3,"samples":99}]})");
+  ASSERT_TRUE(recipe);
+  EXPECT_TRUE(recipe->steps.empty());
+  EXPECT_FALSE(recipe->radiosity);
+  ASSERT_TRUE(recipe->grid);
+  EXPECT_EQ(recipe->grid->resolution, (std::array<int, 3>{4, 5, 6}));
+  EXPECT_EQ(recipe->grid->content, GridContent::all);
+  EXPECT_EQ(recipe->grid->blend, GridBlend::paper);
+  EXPECT_EQ(recipe->grid->bounces, 3);
+  EXPECT_EQ(recipe->grid->samples, 99);
+  const auto again = parse_recipe(recipe_json(*recipe));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
+}
+
+TEST(Recipe, PromisesOfAGridNeedAResolutionLeftOpen) {
+  EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid"}]})"));
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid","resolution":[4,4,4]}]})"),
+            (std::vector<std::string>{"/quality"}));
+}
+
 }  // namespace
 }  // namespace kiln

@@ -91,8 +91,11 @@ TEST(CellCorners, CellsWithASurfaceAreThoseThatItPasses) {
   for (std::size_t i = 0; i < crossed.size(); ++i) {
     const auto [x, y, z] = lattice.cell(i);
     // y = .1 lies between the vertices 4 (.0625) and 5 (.1875).
-    if (y == 4) EXPECT_TRUE(crossed[i]);
-    if (y < 3 || y > 5) EXPECT_FALSE(crossed[i]);
+    if (y == 4) {
+      EXPECT_TRUE(crossed[i]);
+    } else if (y < 3 || y > 5) {
+      EXPECT_FALSE(crossed[i]);
+    }
   }
 }
 

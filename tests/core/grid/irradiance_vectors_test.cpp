@@ -95,7 +95,8 @@ TEST(IrradianceVectors, OfASingleRayAreItsClampedCosineAlongTheAxes) {
   OctantSums sums;
   sums.add(w, {5, 5, 5});
   const IrradianceVectors v = sums.vectors(1);
-  const auto exact = exact_parts(v), paper = paper_parts(v);
+  const auto exact = exact_parts(v);
+  const auto paper = paper_parts(v);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (const float sign : {1.0F, -1.0F}) {
       Vec3f n;

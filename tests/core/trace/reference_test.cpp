@@ -102,6 +102,17 @@ TEST(Reference, EveryBounceAddsOneTermOfTheSeries) {
   }
 }
 
+TEST(Reference, LightThatMustHaveBeenReflectedIsTheRestOfTheSeries) {
+  Scene scene;
+  add_room(scene, 0.5F, add_material(scene, {0.5F, 0.5F, 0.5F}, {1, 1, 1}));
+  for (const int from : {1, 2}) {
+    const ReferenceOptions options{.samples = 128, .bounces = 3, .from = from};
+    const Mean mean = mean_of(run(scene, points_on(scene, 0, 12, 100), kLamps, options));
+    EXPECT_NEAR(mean.value, (from == 1 ? 0.5 : 0) + 0.25 + 0.125, 4 * mean.error) << from;
+  }
+  EXPECT_EQ(run(open_floor(), {kFloorPoint}, kWhiteSky, {.samples = 64, .from = 1}).value[0], Vec3d{});
+}
+
 TEST(Reference, SolidBodyOfAnyAlbedoUnderAWhiteSkyStaysWhite) {
   // Convex: nothing but sky is seen, so the value is exactly 1 whatever the albedo.
   Scene scene;
