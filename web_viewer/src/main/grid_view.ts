@@ -165,7 +165,7 @@ function partialCells({ corners, cells }: GridFile): number[] {
   return out;
 }
 
-/// A line at each vertex along the net flux (Phi, its channels together), as long as the light is one-sided, in its colour.
+/// A line at each vertex along the net flux (Phi, its channels together), as long as the light is one-sided, in its hue.
 function vertexArrows(grid: GridFile): LineSegments {
   const count = grid.size[0] * grid.size[1] * grid.size[2];
   const [position, colour] = [new Float32Array(6 * count), new Float32Array(6 * count)];
@@ -177,16 +177,16 @@ function vertexArrows(grid: GridFile): LineSegments {
       const start = grid.origin[a] + at[a] * grid.spacing[a];
       position[6 * v + a] = start;
       position[6 * v + 3 + a] = start + length * flux[a];
-      colour[6 * v + 3 + a] = light[a];
+      colour[6 * v + a] = colour[6 * v + 3 + a] = light[a] / Math.max(1e-20, ...light);
     }
   }
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(position, 3));
   geometry.setAttribute('color', new BufferAttribute(colour, 3));
-  return new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
+  return new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true, toneMapped: false }));
 }
 
-/// Net flux over the flux from all sides (at most 1 in length), and the mean light over all directions.
+/// Net flux over the flux from all sides (at most 1 in length), and light from all sides up to a factor.
 function vertexLight(grid: GridFile, v: number): { flux: number[]; light: number[] } {
   const half = (part: number, c: number) => DataUtils.fromHalfFloat(grid.parts[part][4 * v + c]);
   const sum = (part: number) => half(part, 0) + half(part, 1) + half(part, 2);
@@ -194,13 +194,13 @@ function vertexLight(grid: GridFile, v: number): { flux: number[]; light: number
     const all = Math.max(1e-20, sum(3) + sum(4) + sum(5)) / 1.5; // integral of L |w_i| over the axes: 3/2 of that of L, if even
     return {
       flux: [0, 1, 2].map((a) => sum(a) / all),
-      light: [0, 1, 2].map((c) => (grid.scale * (half(3, c) + half(4, c) + half(5, c))) / (6 * Math.PI)),
+      light: [0, 1, 2].map((c) => half(3, c) + half(4, c) + half(5, c)),
     };
   }
   const sides = [0, 1, 2, 3, 4, 5];
   const all = Math.max(1e-20, sides.reduce((s, d) => s + sum(2 * d), 0)) / 1.5;
   return {
     flux: [0, 1, 2].map((a) => (sum(4 * a) - sum(4 * a + 2)) / all),
-    light: [0, 1, 2].map((c) => (grid.scale * sides.reduce((s, d) => s + half(2 * d, c), 0)) / (6 * Math.PI)),
+    light: [0, 1, 2].map((c) => sides.reduce((s, d) => s + half(2 * d, c), 0)),
   };
 }
