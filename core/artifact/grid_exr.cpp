@@ -19,10 +19,15 @@ struct CornerPart {
   std::size_t first;
   int channels;
 };
-constexpr CornerPart kCornerParts[] = {{"corners.surface.0", 0, 3}, {"corners.surface.1", 3, 3},
-                                       {"corners.room.0", 6, 4},    {"corners.room.1", 10, 4}};
+constexpr CornerPart kCornerParts[] = {{"corners.px", 0, 3},       {"corners.nx", 3, 3},  {"corners.py", 6, 3},
+                                       {"corners.ny", 9, 3},       {"corners.pz", 12, 3}, {"corners.nz", 15, 3},
+                                       {"corners.room.0", 18, 4}, {"corners.room.1", 22, 4}};
 
-std::uint8_t& corner_byte(CellCorners& cell, std::size_t i) { return i < 6 ? cell.surface[i] : cell.room[i - 6]; }
+std::uint8_t& corner_byte(CellCorners& cell, std::size_t i) {
+  if (i >= 18) return cell.room[i - 18];
+  CornerCut& side = cell.surface[i / 3];
+  return i % 3 == 0 ? side.cut : i % 3 == 1 ? side.below : side.above;
+}
 
 /// Directions are stored as they are, all else divided by the grid's scale.
 bool is_scaled(GridBlend blend, std::size_t part) { return blend == GridBlend::exact || part % 2 == 0; }
@@ -141,6 +146,8 @@ Result<std::vector<CellCorners>> read_corners(const std::vector<ExrPart>& parts,
         const float value = part->pixels[i * static_cast<std::size_t>(part->channels) + c];
         if (!(value >= 0 && value <= 255) || value != std::floor(value))
           return fault("grid_invalid", std::string("Part ") + what.name + " must hold whole numbers up to 255.", name);
+        if (what.channels == 3 && c == 0 && value >= 192)
+          return fault("grid_invalid", std::string("Part ") + what.name + " cuts along a fourth axis.", name);
         corner_byte(cells[i], what.first + c) = static_cast<std::uint8_t>(value);
       }
     }

@@ -1,8 +1,10 @@
 #include "core/grid/cell_corners.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <span>
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
@@ -20,7 +22,9 @@ constexpr std::size_t kBlock = 256;
 struct Vote {
   std::uint64_t key = 0;  // cell x 6 + direction
   std::uint8_t seen = 0;
+  std::array<double, 3> fraction{};  // its place in the cell
 };
+using Votes = std::span<const Vote>;
 
 double smallest_face(const Lattice& lattice) {
   const Vec3d& s = lattice.spacing;
@@ -54,7 +58,7 @@ class Voters {
   Vote vote(const Vec3f& position, const Vec3f& normal, const Vec3f& face) const {
     const CellPlace place = place_in(lattice_, to_double(position));
     const std::uint8_t seen = corners_seen(tracer_, lattice_, stands_, place, offset_origin(position, face));
-    return {lattice_.cell_index(place.cell) * kDirections + nearest_direction(normal), seen};
+    return {lattice_.cell_index(place.cell) * kDirections + nearest_direction(normal), seen, place.fraction};
   }
 
   const Tracer& tracer_;
@@ -74,18 +78,50 @@ std::vector<Vote> surface_votes(const Tracer& tracer, const Lattice& lattice, co
   });
   std::vector<Vote> votes;
   for (const auto& own : found) votes.insert(votes.end(), own.begin(), own.end());
-  std::sort(votes.begin(), votes.end(), [](const Vote& a, const Vote& b) { return a.key < b.key; });
+  std::stable_sort(votes.begin(), votes.end(), [](const Vote& a, const Vote& b) { return a.key < b.key; });
   return votes;
 }
 
-/// The corners that at least half of the votes see; at least one sees it.
-std::uint8_t majority(const Vote* begin, const Vote* end) {
-  std::uint8_t bits = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto seen = std::count_if(begin, end, [&](const Vote& v) { return (v.seen >> corner & 1) != 0; });
-    if (2 * seen >= end - begin) bits = static_cast<std::uint8_t>(bits | 1 << corner);
+constexpr int kCuts = 15;  // planes tried along each axis
+
+/// How many votes see each corner.
+struct Tally {
+  std::array<int, 8> seen{};
+  int votes = 0;
+
+  void add(const Vote& v) {
+    ++votes;
+    for (std::size_t k = 0; k < 8; ++k) seen[k] += v.seen >> k & 1;
   }
-  return bits;
+  /// The corners that at least half of the votes see.
+  std::uint8_t majority() const {
+    unsigned bits = 0;
+    for (std::size_t k = 0; k < 8; ++k) bits |= 2 * seen[k] >= votes && votes > 0 ? 1U << k : 0U;
+    return static_cast<std::uint8_t>(bits);
+  }
+  int outvoted() const {
+    int sum = 0;
+    for (const int n : seen) sum += std::min(n, votes - n);
+    return sum;
+  }
+};
+
+CornerCut best_cut(Votes votes) {
+  Tally all;
+  for (const Vote& v : votes) all.add(v);
+  CornerCut best{0, all.majority(), 0};
+  int least = all.outvoted();
+  for (std::size_t axis = 0; axis < 3 && least > 0; ++axis) {
+    for (int k = 1; k <= kCuts; ++k) {
+      const int place = 64 * k / (kCuts + 1);
+      Tally below, above;
+      for (const Vote& v : votes) (v.fraction[axis] >= place / 64.0 ? above : below).add(v);
+      if (below.votes == 0 || above.votes == 0 || below.outvoted() + above.outvoted() >= least) continue;
+      least = below.outvoted() + above.outvoted();
+      best = {static_cast<std::uint8_t>(axis << 6 | static_cast<unsigned>(place)), below.majority(), above.majority()};
+    }
+  }
+  return best;
 }
 
 /// Whether the plane of a triangle passes through a box, or within half a box of it.
@@ -157,11 +193,17 @@ std::vector<CellCorners> find_cell_corners(const Tracer& tracer, const Lattice& 
     }
   });
   const std::vector<Vote> votes = surface_votes(tracer, lattice, stands, threads);
+  std::vector<Votes> groups;
   for (std::size_t first = 0, last = 0; first < votes.size(); first = last) {
     while (last < votes.size() && votes[last].key == votes[first].key) ++last;
-    const std::uint64_t key = votes[first].key;
-    cells[key / kDirections].surface[key % kDirections] = majority(votes.data() + first, votes.data() + last);
+    groups.push_back(Votes(votes).subspan(first, last - first));
   }
+  threads.for_blocks(groups.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint64_t key = groups[i].front().key;
+      cells[key / kDirections].surface[key % kDirections] = best_cut(groups[i]);
+    }
+  });
   rays += asked + 8 * votes.size();
   return cells;
 }

@@ -3,7 +3,8 @@
 //
 // Surfaces  Points are spread over every triangle (kPerCell to a cell's face, at least one), on the sides that show; each
 //           asks for the corners it sees, and its normal says which of six directions it votes for. A corner counts for a
-//           direction where at least half of the votes see it.
+//           direction where at least half of the votes see it. Votes that differ are first parted by the cut, of
+//           3 x kCuts, that leaves the fewest of them outvoted.
 // Rooms     In cells that a triangle passes through, the middle of each eighth asks. All corners count elsewhere.
 // Beats     plane tests and moving the look-up (shared notes, measured); a ray for every look-up is the truth it is
 //           tested against.

@@ -26,7 +26,7 @@ std::uint8_t corners_that_count(const Grid& grid, const CellPlace& place, const 
   if (grid.cells.empty() || kind == GridPlace::anywhere) return kAll;
   const CellCorners& cell = grid.cells[grid.lattice.cell_index(place.cell)];
   std::uint8_t bits = 0;
-  if (kind == GridPlace::surface) bits = cell.surface[nearest_direction(n)];
+  if (kind == GridPlace::surface) bits = cell.surface[nearest_direction(n)].at(place.fraction);
   if (bits == 0) {
     const auto& f = place.fraction;
     bits = cell.room[(f[0] < 0.5 ? 0U : 1U) | (f[1] < 0.5 ? 0U : 2U) | (f[2] < 0.5 ? 0U : 4U)];

@@ -1,6 +1,7 @@
 #include "core/grid/sphere_gather.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -38,26 +39,16 @@ SphereGather::SphereGather(const World& world, GridContent content, int rays, st
 
 GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const {
   const LocalFrame frame = turned(sets_, seed_, item);
-  Random random(seed_, item, 2);
-  OctantSums sums;
-  Seen seen;
-  Rays16 packet;
-  Hits16 hits;
-  packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z), packet.far.fill(kFar);
-  for (int k = 0; k < sets_.samples() / kPacket; ++k) {
-    if (seen.rays == kFirstRays && seen.nothing()) break;  // inside a solid
-    sets_.turn(frame.set, k, frame.basis, packet);
-    world_.tracer.closest16(packet, hits);
-    rays += kPacket;
-    seen.rays += kPacket;
-    for (std::size_t i = 0; i < kPacket; ++i) {
-      const Vec3f w{packet.dx[i], packet.dy[i], packet.dz[i]};
-      const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
-      sums.add(w, look_along(w, hit, random, seen, rays));
-    }
+  Work work{Random(seed_, item, 2), {}, rays};
+  Rays16 from;
+  from.ox.fill(place.x), from.oy.fill(place.y), from.oz.fill(place.z), from.far.fill(kFar);
+  const int packets = sets_.samples() / kPacket;
+  for (int first = 0; first < packets; first += kBatch) {
+    if (work.sent == kFirstRays && work.open == 0) break;  // inside a solid
+    trace_batch(frame, first, std::min(first + kBatch, packets), from, work);
   }
-  GatheredLight out{sums.vectors(kSphere / static_cast<float>(seen.rays)),
-                    static_cast<float>(seen.backs) / static_cast<float>(seen.rays)};
+  GatheredLight out{work.sums.vectors(kSphere / static_cast<float>(work.sent)),
+                    static_cast<float>(work.backs) / static_cast<float>(work.sent)};
   if (content_ == GridContent::all) {
     OctantSums direct;
     add_lamps(place, direct, rays);
@@ -68,20 +59,57 @@ GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint
   return out;
 }
 
+/// Packets first .. end - 1: all are traced before any hit is looked at, so that what the hits need is in the cache.
+void SphereGather::trace_batch(const LocalFrame& frame, int first, int end, Rays16& from, Work& work) const {
+  std::array<Rays16, kBatch> rays;
+  std::array<Hits16, kBatch> hits;
+  const auto count = static_cast<std::size_t>(end - first);
+  int inside = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    rays[k] = from;
+    sets_.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
+    world_.tracer.closest16(rays[k], hits[k]);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const std::uint32_t triangle = hits[k].triangle[i];
+      if (triangle == kNoHit) continue;
+      world_.faces.prefetch(triangle);
+      if (world_.surface != nullptr) world_.surface->prefetch(triangle);
+    }
+  }
+  const int sent = static_cast<int>(count) * kPacket;
+  work.sent += sent;
+  work.rays += static_cast<std::uint64_t>(sent);
+  const auto each = [&](const auto& look) {
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < kPacket; ++i) {
+        look(Vec3f{rays[k].dx[i], rays[k].dy[i], rays[k].dz[i]},
+             Hit{hits[k].t[i], hits[k].u[i], hits[k].v[i], hits[k].triangle[i], false});
+      }
+    }
+  };
+  if (first == 0) {
+    each([&](const Vec3f& w, const Hit& hit) {
+      if (hit && world_.faces.side(hit.triangle, w) != HitSide::front) ++inside;
+    });
+    work.enclosed = 2 * inside > sent;
+  }
+  each([&](const Vec3f& w, const Hit& hit) { work.sums.add(w, look_along(w, hit, work)); });
+}
+
 /// What one ray of the sphere brings.
-Vec3f SphereGather::look_along(const Vec3f& w, const Hit& hit, Random& random, Seen& seen, std::uint64_t& rays) const {
+Vec3f SphereGather::look_along(const Vec3f& w, const Hit& hit, Work& work) const {
   const bool all = content_ == GridContent::all;
   if (!hit) {
-    ++seen.open;
+    ++work.open;
     return all ? seen_sky(w) : Vec3f{};
   }
   if (world_.faces.side(hit.triangle, w) == HitSide::dark) {
-    ++seen.backs;
+    ++work.backs;
     return {};
   }
   LitSurface::Reflected from{.light = {}, .known = true};
-  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, random, rays);
-  if (from.known) ++seen.open;
+  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, work.enclosed, work.random, work.rays);
+  if (from.known) ++work.open;
   return all ? from.light + seen_emitter(hit, w) : from.light;
 }
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/random.h"
 #include "core/grid/grid.h"
 #include "core/meshless/lit_surface.h"
 #include "core/prt/direction_sets.h"
@@ -41,13 +42,18 @@ class SphereGather {
   GatheredLight at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const;
 
  private:
-  static constexpr int kFirstRays = 4 * kPacket;  // a stratified set of their own
-  /// What the rays of a place met.
-  struct Seen {
-    int rays = 0, backs = 0, open = 0;  // open: the sky, or a surface that light is known of
-    bool nothing() const { return open == 0; }
+  static constexpr int kBatch = 4;                     // packets that are traced together
+  static constexpr int kFirstRays = kBatch * kPacket;  // a stratified set of their own
+  /// A place in the making.
+  struct Work {
+    Random random;
+    OctantSums sums;
+    std::uint64_t& rays;
+    int sent = 0, backs = 0, open = 0;  // rays of the sphere; open: they met the sky, or a surface that light is known of
+    bool enclosed = false;              // most of the first rays met backs: senders must be seen to answer
   };
-  Vec3f look_along(const Vec3f& w, const Hit&, Random&, Seen&, std::uint64_t& rays) const;
+  void trace_batch(const LocalFrame&, int first, int end, Rays16& from, Work&) const;
+  Vec3f look_along(const Vec3f& w, const Hit&, Work&) const;
   Vec3f seen_sky(const Vec3f& w) const;
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
   void add_lamps(const Vec3f& place, OctantSums&, std::uint64_t& rays) const;

@@ -24,9 +24,9 @@ void LitSurface::set_light(std::vector<Vec3f> light) {
   light_ = std::move(light);
 }
 
-LitSurface::Reflected LitSurface::reflected(const Hit& hit, const Vec3f& direction, Random& random,
+LitSurface::Reflected LitSurface::reflected(const Hit& hit, const Vec3f& direction, bool enclosed, Random& random,
                                             std::uint64_t& rays) const {
-  const SenderPaths::End end = paths_.follow(hit, direction, false, random, rays);
+  const SenderPaths::End end = paths_.follow(hit, direction, enclosed, random, rays);
   if (end.sender == Senders::kNone) return {end.picked_up, false};
   return {end.picked_up + end.throughput * light_[end.sender], true};
 }

@@ -32,7 +32,10 @@ class LitSurface {
     Vec3f light;
     bool known = false;  // some sender stands for the place, or for one that the path came to
   };
-  Reflected reflected(const Hit& hit, const Vec3f& direction, Random&, std::uint64_t& rays) const;
+  /// `enclosed` as in SenderPaths::follow.
+  Reflected reflected(const Hit& hit, const Vec3f& direction, bool enclosed, Random&, std::uint64_t& rays) const;
+  /// Asks for what reflected() will read of this triangle.
+  void prefetch(std::uint32_t triangle) const { senders_.prefetch(triangle); }
 
  private:
   const Tracer& tracer_;

@@ -31,6 +31,7 @@ class Senders {
   std::uint32_t nearest(const SurfaceSite&) const;
   /// The same at a hit on the lit side of a face.
   std::uint32_t at(std::uint32_t triangle, float u, float v) const;
+  void prefetch(std::uint32_t triangle) const { __builtin_prefetch(&faces_[triangle]); }
   /// Where rays of a sender start.
   Vec3f origin(std::uint32_t sender) const { return ray_origin(transfer_point(points_.points[sender])); }
 

@@ -84,7 +84,7 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
     report(c, name + ", a ray to each corner", "", [&](const Vec3f& p, const Vec3f& n) {
       const CellPlace place = place_in(grid.lattice, to_double(p));
       const std::uint8_t bits = corners_seen(c.tracer, grid.lattice, stands, place, offset_origin(p, n));
-      own.cells[grid.lattice.cell_index(place.cell)].surface.fill(bits);
+      own.cells[grid.lattice.cell_index(place.cell)].surface.fill({0, bits, 0});
       return irradiance_at(own, to_double(p), n);
     });
   }

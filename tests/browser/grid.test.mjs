@@ -38,7 +38,7 @@ test('the file is read as it was written', () => {
   assert.deepEqual(grid.size, [6, 5, 4]);
   assert.equal(grid.blend, 'exact');
   assert.equal(grid.parts.length, 9);
-  assert.equal(grid.corners.length, 16 * 5 * 4 * 3);
+  assert.equal(grid.corners.length, 32 * 5 * 4 * 3);
   assert.ok(grid.corners.some((b) => b !== 255 && b !== 0));
 });
 

@@ -26,7 +26,10 @@ Grid random_grid(GridBlend blend, const std::array<int, 3>& size, float scale = 
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     Random random(2, i);
     for (auto& bits : grid.cells[i].room) bits = static_cast<std::uint8_t>(random.next());
-    for (auto& bits : grid.cells[i].surface) bits = static_cast<std::uint8_t>(random.next());
+    for (CornerCut& side : grid.cells[i].surface) {
+      side = {static_cast<std::uint8_t>(random.next() % 192), static_cast<std::uint8_t>(random.next()),
+              static_cast<std::uint8_t>(random.next())};
+    }
   }
   return grid;
 }

@@ -15,18 +15,20 @@ export interface GridFile {
   names: readonly string[]; // of the parts
   parts: Uint16Array[]; // RGBA halves, vertex (k * size.y + j) * size.x + i
   cells: Triple; // max(1, size - 1)
-  /// Sixteen bytes a cell: bits of +x -x +y -y +z -z, two unused, bits of eighths 0 to 7. Null: every corner counts.
+  /// kCellBytes a cell: cut, bits below and bits above for +x -x +y -y +z -z, six unused, bits of eighths 0 to 7. Null: every
+  /// corner counts.
   corners: Uint8Array | null;
 }
 
 const kExact = ['phi.x', 'phi.y', 'phi.z', 'a.x', 'a.y', 'a.z', 'b.xy', 'b.xz', 'b.yz'];
 const kPaper = ['px', 'nx', 'py', 'ny', 'pz', 'nz'].flatMap((d) => [`${d}.color`, `${d}.direction`]);
-/// Where the channels of each corner part go among the sixteen bytes.
+export const kCellBytes = 32;
+export const kRoomBytes = 24; // where those of eighths begin
+/// Where the channels of each corner part go among them.
 const kCorners: readonly (readonly [string, readonly number[]])[] = [
-  ['corners.surface.0', [0, 1, 2]],
-  ['corners.surface.1', [3, 4, 5]],
-  ['corners.room.0', [8, 9, 10, 11]],
-  ['corners.room.1', [12, 13, 14, 15]],
+  ...['px', 'nx', 'py', 'ny', 'pz', 'nz'].map((d, i) => [`corners.${d}`, [3 * i, 3 * i + 1, 3 * i + 2]] as const),
+  ['corners.room.0', [24, 25, 26, 27]],
+  ['corners.room.1', [28, 29, 30, 31]],
 ];
 
 interface Part {
@@ -92,11 +94,11 @@ function readParts(file: ArrayBuffer): Part[] {
 }
 
 function readCorners(find: (name: string) => Uint16Array, cells: number): Uint8Array {
-  const out = new Uint8Array(16 * cells);
+  const out = new Uint8Array(kCellBytes * cells);
   for (const [name, places] of kCorners) {
     const pixels = find(name);
     for (let i = 0; i < cells; ++i)
-      places.forEach((place, c) => (out[16 * i + place] = DataUtils.fromHalfFloat(pixels[4 * i + c])));
+      places.forEach((place, c) => (out[kCellBytes * i + place] = DataUtils.fromHalfFloat(pixels[4 * i + c])));
   }
   return out;
 }
@@ -126,12 +128,15 @@ export function irradianceAt(grid: GridFile, p: Triple, n: Triple, place: 'surfa
 
 function cornerBits(grid: GridFile, cell: number[], f: number[], n: Triple, place: 'surface' | 'room'): number {
   if (!grid.corners) return 255;
-  const at = 16 * ((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
+  const at = kCellBytes * ((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
   const size = n.map(Math.abs);
   const axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-  const surface = place === 'surface' ? grid.corners[at + 2 * axis + (n[axis] < 0 ? 1 : 0)] : 0;
+  const side = at + 3 * (2 * axis + (n[axis] < 0 ? 1 : 0));
+  const cut = grid.corners[side];
+  const above = cut !== 0 && f[cut >> 6] >= (cut & 63) / 64;
+  const surface = place === 'surface' ? grid.corners[side + (above ? 2 : 1)] : 0;
   const eighth = f.reduce((sum, x, a) => sum + (x >= 0.5 ? 1 << a : 0), 0);
-  return surface || grid.corners[at + 8 + eighth] || 255;
+  return surface || grid.corners[at + kRoomBytes + eighth] || 255;
 }
 
 function blend(grid: GridFile, n: Triple, c: number, read: (part: number, c: number) => number): number {

@@ -15,7 +15,7 @@ import {
   SphereGeometry,
   Vector3,
 } from 'three';
-import type { GridFile } from '../asset/grid_file';
+import { type GridFile, kCellBytes, kRoomBytes } from '../asset/grid_file';
 import { gridMaterial } from '../shaders/grid_material';
 import { GridTextures } from '../shaders/grid_textures';
 import type { Viewer } from './viewer';
@@ -157,9 +157,9 @@ void main() { gl_Position = projectionMatrix * viewMatrix * vec4(origin + spacin
 function partialCells({ corners, cells }: GridFile): number[] {
   const out: number[] = [];
   if (!corners) return out;
-  for (let i = 0; i < corners.length / 16; ++i) {
-    const bytes = corners.subarray(16 * i, 16 * i + 16);
-    const whole = bytes.every((b, k) => b === 255 || (k < 8 && b === 0));
+  for (let i = 0; i < corners.length / kCellBytes; ++i) {
+    const bytes = corners.subarray(kCellBytes * i, kCellBytes * (i + 1));
+    const whole = bytes.every((b, k) => b === 255 || (k < kRoomBytes && b === 0));
     if (!whole) out.push(i % cells[0], Math.floor(i / cells[0]) % cells[1], Math.floor(i / (cells[0] * cells[1])));
   }
   return out;

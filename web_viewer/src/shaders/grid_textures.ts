@@ -12,7 +12,7 @@ import {
   UnsignedIntType,
   Vector3,
 } from 'three';
-import type { GridFile } from '../asset/grid_file';
+import { type GridFile, kCellBytes, kRoomBytes } from '../asset/grid_file';
 
 export class GridTextures {
   readonly uniforms: Record<string, { value: unknown }>;
@@ -27,7 +27,12 @@ export class GridTextures {
       texture.minFilter = texture.magFilter = LinearFilter;
       return texture;
     });
-    const corners = new Data3DTexture(new Uint32Array(cornerWords(grid).buffer), ...grid.cells);
+    const corners = new Data3DTexture(
+      new Uint32Array(cornerBytes(grid).buffer),
+      2 * grid.cells[0], // two texels of sixteen bytes a cell
+      grid.cells[1],
+      grid.cells[2],
+    );
     corners.format = RGBAIntegerFormat;
     corners.type = UnsignedIntType;
     corners.internalFormat = 'RGBA32UI';
@@ -55,9 +60,8 @@ export class GridTextures {
   }
 }
 
-function cornerWords(grid: GridFile): Uint8Array {
-  if (grid.corners) return grid.corners;
-  return new Uint8Array(16 * grid.cells[0] * grid.cells[1] * grid.cells[2]).fill(255);
+function cornerBytes(grid: GridFile): Uint8Array {
+  return grid.corners ?? new Uint8Array(kCellBytes * grid.cells[0] * grid.cells[1] * grid.cells[2]).fill(255);
 }
 
 const kNumbers = (n: number) => Array.from({ length: n }, (_, i) => i);
@@ -78,16 +82,22 @@ struct GridPlace {
   bool whole;    // every corner counts
 };
 
-uint gridByte(uvec4 words, int i) {
-  return (words[i >> 2] >> uint(8 * (i & 3))) & 255u;
+uint gridByte(uvec4 words[2], int i) {
+  return (words[i >> 4][(i >> 2) & 3] >> uint(8 * (i & 3))) & 255u;
 }
 
-uint gridBits(uvec4 words, vec3 f, vec3 n, bool surface) {
-  vec3 size = abs(n);
-  int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  uint bits = surface ? gridByte(words, 2 * axis + (n[axis] < 0.0 ? 1 : 0)) : 0u;
+uint gridBits(uvec4 words[2], vec3 f, vec3 n, bool surface) {
+  uint bits = 0u;
+  if (surface) {
+    vec3 size = abs(n);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    int side = 3 * (2 * axis + (n[axis] < 0.0 ? 1 : 0));
+    uint cut = gridByte(words, side);
+    bool above = cut != 0u && f[cut >> 6] >= float(cut & 63u) / 64.0;
+    bits = gridByte(words, side + (above ? 2 : 1));
+  }
   int eighth = (f.x >= 0.5 ? 1 : 0) + (f.y >= 0.5 ? 2 : 0) + (f.z >= 0.5 ? 4 : 0);
-  if (bits == 0u) bits = gridByte(words, 8 + eighth);
+  if (bits == 0u) bits = gridByte(words, ${kRoomBytes} + eighth);
   return bits == 0u ? 255u : bits;
 }
 
@@ -97,7 +107,11 @@ GridPlace gridPlace(vec3 p, vec3 n, bool surface) {
   place.cell = clamp(ivec3(floor(t)), ivec3(0), max(ivec3(0), ivec3(gridSize) - 2));
   place.at = (t + 0.5) / gridSize;
   vec3 f = t - vec3(place.cell);
-  uint bits = gridBits(texelFetch(gridCorners, place.cell, 0), f, n, surface);
+  ivec3 word = place.cell * ivec3(2, 1, 1);
+  uvec4 words[2];
+  words[0] = texelFetch(gridCorners, word, 0);
+  words[1] = texelFetch(gridCorners, word + ivec3(1, 0, 0), 0);
+  uint bits = gridBits(words, f, n, surface);
   place.whole = bits == 255u;
   if (place.whole) return place;
   float sum = 0.0;
