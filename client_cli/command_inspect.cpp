@@ -143,8 +143,7 @@ Outcome<json> facts_of(const std::string& path) {
     KILN_TRY(grid, load_grid(path));
     facts["kind"] = "grid";
     facts["grid"] = grid_facts(grid);
-    facts["bytes_per_vertex"] =
-        static_cast<double>(bytes.size()) / static_cast<double>(grid.lattice.vertices());
+    facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) / static_cast<double>(grid.lattice.vertices());
     facts["certificate"] = certificate_beside(path, "/grid/certificate");
     return facts;
   } else {
@@ -181,8 +180,8 @@ std::string light_lines(const json& light) {
 
 std::string grid_text(const json& facts) {
   const json& grid = facts["grid"];
-  return line("grid", grid["size"].dump() + " vertices, " + grid["spacing"].dump() + " apart from " +
-                          grid["origin"].dump()) +
+  return line("grid",
+              grid["size"].dump() + " vertices, " + grid["spacing"].dump() + " apart from " + grid["origin"].dump()) +
          line("light", grid["content"].get<std::string>() + ", " + grid["blend"].get<std::string>() + " blend" +
                            (grid["corners"] == true ? ", corners that count" : "")) +
          line("certificate", facts["certificate"].is_object()

@@ -31,7 +31,8 @@ struct LookupOptions {
 std::vector<LightValue> artefact_values(const BakedScene&, const Places&, std::span<const Vec3f> light,
                                         const LookupOptions&);
 
-/// What a grid says of receivers in space: no surface is asked for, albedo is 1, distance 0. A zero normal has no value.
+/// What a grid says of receivers in space: no surface is asked for, albedo is 1, distance 0. A zero normal has no
+/// value.
 std::vector<LightValue> grid_values(const Grid&, std::span<const QueryPoint>);
 
 /// The same quantity by path tracing, with standard errors from independent batches.

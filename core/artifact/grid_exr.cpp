@@ -19,8 +19,8 @@ struct CornerPart {
   std::size_t first;
   int channels;
 };
-constexpr CornerPart kCornerParts[] = {{"corners.px", 0, 3},       {"corners.nx", 3, 3},  {"corners.py", 6, 3},
-                                       {"corners.ny", 9, 3},       {"corners.pz", 12, 3}, {"corners.nz", 15, 3},
+constexpr CornerPart kCornerParts[] = {{"corners.px", 0, 3},      {"corners.nx", 3, 3},     {"corners.py", 6, 3},
+                                       {"corners.ny", 9, 3},      {"corners.pz", 12, 3},    {"corners.nz", 15, 3},
                                        {"corners.room.0", 18, 4}, {"corners.room.1", 22, 4}};
 
 std::uint8_t& corner_byte(CellCorners& cell, std::size_t i) {
@@ -140,7 +140,8 @@ Result<std::vector<CellCorners>> read_corners(const std::vector<ExrPart>& parts,
   std::vector<CellCorners> cells(lattice.cell_count());
   for (const CornerPart& what : kCornerParts) {
     const ExrPart* part = find_part(parts, what.name, x, y * z, what.channels);
-    if (!part) return fault("grid_invalid", std::string("Part ") + what.name + " is missing or has another size.", name);
+    if (!part)
+      return fault("grid_invalid", std::string("Part ") + what.name + " is missing or has another size.", name);
     for (std::size_t i = 0; i < cells.size(); ++i) {
       for (std::size_t c = 0; c < static_cast<std::size_t>(what.channels); ++c) {
         const float value = part->pixels[i * static_cast<std::size_t>(part->channels) + c];
@@ -176,17 +177,18 @@ Bytes write_grid_exr(const Grid& grid, const Frame& frame, const std::string& pr
     if (!grid.cells.empty()) parts.push_back(corners_of(grid, what));
   }
   const auto& [x, y, z] = grid.lattice.size;
-  parts[0].text = {{"kiln.grid", kVersion},
-                   {"kiln.blend", grid.blend == GridBlend::exact ? "exact" : "paper"},
-                   {"kiln.content", grid.content == GridContent::indirect ? "indirect" : "all"},
-                   {"kiln.size", std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z)},
-                   {"kiln.origin", text_of(frame.to_world(grid.lattice.origin))},
-                   {"kiln.spacing", text_of(grid.lattice.spacing * frame.scale)},
-                   {"kiln.scale", text_of(scale)},
-                   {"kiln.axes", "glTF: right-handed, +Y up, metres"},
-                   {"kiln.quantity", "irradiance, W m^-2; a value is its pixel times kiln.scale"},
-                   {"kiln.layout", "column i of row k * size.y + j is vertex (i, j, k), at origin + (i, j, k) * spacing"},
-                   {"kiln.provenance", provenance}};
+  parts[0].text = {
+      {"kiln.grid", kVersion},
+      {"kiln.blend", grid.blend == GridBlend::exact ? "exact" : "paper"},
+      {"kiln.content", grid.content == GridContent::indirect ? "indirect" : "all"},
+      {"kiln.size", std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z)},
+      {"kiln.origin", text_of(frame.to_world(grid.lattice.origin))},
+      {"kiln.spacing", text_of(grid.lattice.spacing * frame.scale)},
+      {"kiln.scale", text_of(scale)},
+      {"kiln.axes", "glTF: right-handed, +Y up, metres"},
+      {"kiln.quantity", "irradiance, W m^-2; a value is its pixel times kiln.scale"},
+      {"kiln.layout", "column i of row k * size.y + j is vertex (i, j, k), at origin + (i, j, k) * spacing"},
+      {"kiln.provenance", provenance}};
   return write_exr_parts(parts);
 }
 

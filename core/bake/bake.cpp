@@ -159,10 +159,9 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   if (input.recipe.certificate) {
     log.begin("certificate", 1.0);
     const Tracer truth(scene, threads);
-    pass.certificate =
-        certify(decoded, truth, light,
-                {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed},
-                threads);
+    pass.certificate = certify(
+        decoded, truth, light,
+        {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
     if (!plan.radiosity)
       pass.sources = split_error(*pass.certificate, decoded, transport.noise, storage, plan.tail_left);
   }
@@ -202,7 +201,7 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
 Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optional<Environment>& light, Plan plan,
                          Passes& passes, const Checkpoints& checkpoints, BakeLog& log, Threads& threads) {
   constexpr double kFirst = 0.06, kLast = 0.97, kShare = 0.6;  // of what is left of the progress, for each pass
-  if (!input.recipe.promise || plan.grid) {  // a grid has passes of its own
+  if (!input.recipe.promise || plan.grid) {                    // a grid has passes of its own
     log.share(0, kLast);
     return bake_pass(input, scene, light, std::move(plan), log, threads);
   }

@@ -322,7 +322,8 @@ Certificate certify(const BakedScene& decoded, const Tracer& truth, const std::o
   const ErrorStats known = compute_error({judged.shown, judged.truth, judged.noise, pilot.points, few.weight},
                                          {.seed = options.seed, .resamples = 1});
   const double paths = static_cast<double>(std::max<std::size_t>(pilot.points, 1)) * Spending::kPilotSamples;
-  const Spending spending = plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options.bake_rays, options.thorough);
+  const Spending spending =
+      plan_spending(known, std::max(1.0, static_cast<double>(first.rays) / paths), options.bake_rays, options.thorough);
 
   Certificate out;
   const Probe many = probe(spending.points);

@@ -115,8 +115,7 @@ GridCertificate certify_grid(const GridCheck& check, Threads& threads) {
   const std::vector<ReferencePoint> few = visible_points(tracer, Spending::kFewestPoints, seed);
   const std::vector<Vec3d> shown = values_at(check.decoded, frame, few);
   const Truth pilot = truth_at(check, few, Spending::kPilotSamples, mix64(seed), threads);
-  const ErrorStats known =
-      compute_error({shown, pilot.value, pilot.noise, few.size()}, {.seed = seed, .resamples = 1});
+  const ErrorStats known = compute_error({shown, pilot.value, pilot.noise, few.size()}, {.seed = seed, .resamples = 1});
   const double paths = static_cast<double>(std::max<std::size_t>(few.size(), 1)) * Spending::kPilotSamples;
   const Spending spending = plan_spending(known, std::max(1.0, static_cast<double>(pilot.rays) / paths),
                                           check.baked.stats.rays, check.thorough);

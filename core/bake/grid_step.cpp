@@ -18,7 +18,8 @@ struct GridEffort {
 };
 
 GridEffort grid_effort(const Recipe& recipe) {
-  if (recipe.promise) return {"the first pass", kFirstLongest, recipe.promise.target_error.value_or(0) < 0.03 ? 1024 : 512};
+  if (recipe.promise)
+    return {"the first pass", kFirstLongest, recipe.promise.target_error.value_or(0) < 0.03 ? 1024 : 512};
   switch (recipe.quality) {
     case Quality::draft:
       return {"the draft quality", 16, 256};
@@ -104,13 +105,15 @@ struct Ending {
 std::optional<Ending> ending_of(const Recipe& recipe, const GridPass& last, const std::array<int, 3>& next,
                                 std::uint64_t next_memory, double seconds) {
   const Promise& promise = recipe.promise;
-  const std::string reached = "the grid of " + text_of(last.size) + " vertices has an error of at most " + percent(last.high);
+  const std::string reached =
+      "the grid of " + text_of(last.size) + " vertices has an error of at most " + percent(last.high);
   if (promise.target_error && last.high <= *promise.target_error) return Ending{true, "target_met", reached};
   const double then = seconds + last.seconds * vertices_of(next) / vertices_of(last.size);
   if (promise.time_budget_s && then > *promise.time_budget_s)
     return Ending{true, "time_spent", reached + "; the next finer one would not fit the time"};
   const bool kept = !promise.target_error;
-  if (then > recipe.limits.wall_s) return Ending{kept, "floor", reached + "; the next finer one would not fit limits.wall_s"};
+  if (then > recipe.limits.wall_s)
+    return Ending{kept, "floor", reached + "; the next finer one would not fit limits.wall_s"};
   if (*std::max_element(next.begin(), next.end()) > kMostLongest)
     return Ending{kept, "floor", reached + "; finer ones are not baked"};
   if (next_memory > recipe.limits.memory_mb << 20)
@@ -133,16 +136,17 @@ Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment*
   const GridBake& grid = *plan.grid;
   const std::string asked = "asked for by the recipe";
   decide(plan, "resolution", text_of(grid.size),
-         step.resolution     ? asked
+         step.resolution  ? asked
          : recipe.promise ? "the first pass; doubled until the promise is kept"
-                             : effort.reason + std::string(" has ") + std::to_string(effort.longest) +
-                                   " vertices along the longest side");
+                          : effort.reason + std::string(" has ") + std::to_string(effort.longest) +
+                                " vertices along the longest side");
   decide(plan, "content", step.content == GridContent::all ? "all" : "indirect",
          step.content == GridContent::all ? "lamps and sky are in the grid too"
                                           : "direct light is left to the renderer, which knows it sharper");
   decide(plan, "blend", step.blend == GridBlend::exact ? "exact" : "paper",
-         step.blend == GridBlend::exact ? "right for light of three SH bands, in 54 bytes a vertex"
-                                        : "as in the paper, in 72 bytes a vertex: constant light comes back as little as .577");
+         step.blend == GridBlend::exact
+             ? "right for light of three SH bands, in 54 bytes a vertex"
+             : "as in the paper, in 72 bytes a vertex: constant light comes back as little as .577");
   decide(plan, "grid rays", std::to_string(grid.rays), step.samples ? asked : effort.reason);
   if (step.bounces == 0 && step.content == GridContent::indirect)
     decide(plan, "grid light", "none", "no reflections were asked for, and direct light is not in this grid");
@@ -194,7 +198,8 @@ Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& lo
     share += 0.5 * (0.85 - share);
   }
   plan.grid->size = params.size;
-  decide(plan, "grid vertices", std::to_string(out.stats.invalid) + " inside solids, " + std::to_string(out.stats.moved) + " moved",
+  decide(plan, "grid vertices",
+         std::to_string(out.stats.invalid) + " inside solids, " + std::to_string(out.stats.moved) + " moved",
          "those inside are filled from their neighbours, those on a surface gather beside it");
   return out;
 }

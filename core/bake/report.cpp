@@ -232,8 +232,7 @@ std::string report_json(const ReportInput& in) {
   if (in.sources) out["error_sources"] = sources_object(*in.sources);
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.recipe.promise)
-    out["promise"] =
-        in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
+    out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
   return text_of(out);
 }
 

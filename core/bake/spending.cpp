@@ -1,6 +1,7 @@
 #include "core/bake/spending.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kiln {
 
@@ -8,16 +9,15 @@ Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint6
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
   constexpr double kTenthSecond = 128 * Spending::kFewestPoints, kSecond = 1536 * Spending::kFewestPoints,
                    kMostPaths = 4096 * Spending::kFewestPoints;
-  constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
-  // Rare gross errors, like a strip of floor under a column, are a thousandth of the surface and most of the error:
-  // where a promise hangs on it, enough points to meet some.
+  constexpr double kSpread = 30, kFewestSamples = 8;  // c: measured on the scenes
+  // Where a promise hangs on it, enough points to meet some of the errors of a thousandth of the surface.
   const double fewest = thorough ? 4.0 * Spending::kFewestPoints : 1.0 * Spending::kFewestPoints;
   const double paths = std::clamp(kShare * static_cast<double>(bake_rays) / (kSingleRay * rays_per_path),
                                   thorough ? kSecond : kTenthSecond, kMostPaths);
   const double one_path = pilot.noise * pilot.noise * Spending::kPilotSamples;  // its variance
-  const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
+  const double wanted = pilot.relrmse > 0 ? one_path / (pilot.relrmse * pilot.relrmse) * std::sqrt(2 / kSpread) : paths;
   Spending out;
-  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / fewest));
+  out.samples = static_cast<int>(std::clamp(wanted, kFewestSamples, paths / fewest));
   out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, fewest, double{Spending::kMostPoints}));
   return out;
 }

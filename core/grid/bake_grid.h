@@ -3,12 +3,14 @@
 //
 // Place    A vertex within kNearSurface spacings of a surface gathers that far off it (on the front of a single-sided
 //          face): on the very wall it would look through it.
-// Invalid  A vertex of which more than kBackShare of the rays meet backs of single-sided faces is inside a solid. It gets
+// Invalid  A vertex of which more than kBackShare of the rays meet backs of single-sided faces is inside a solid. It
+// gets
 //          the mean of its valid neighbours, then theirs; corners that count never name it, readers without them do.
 // Corners  core/grid/cell_corners.h
 // Paper    Pacanowski et al. 2006, section 3.   Differs  blend and corners (irradiance_vectors.h, grid.h)
 // Cost     rays x vertices closest hits, and a read of a table for each
-// Error    see README.md.   Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if stopped
+// Error    see README.md.   Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if
+// stopped
 
 #include <cstdint>
 #include <functional>
@@ -26,7 +28,8 @@ struct GridBake {
   int rays = 512;       // of a vertex
   bool corners = true;  // find which corners count
   std::uint64_t seed = 0;
-  std::function<void(std::uint64_t done, std::uint64_t total)> progress = {};  // vertices; from any thread, one call at a time
+  std::function<void(std::uint64_t done, std::uint64_t total)> progress =
+      {};  // vertices; from any thread, one call at a time
 };
 
 struct GridStats {

@@ -14,7 +14,7 @@
 namespace kiln {
 namespace {
 
-constexpr double kPerCell = 16;  // points to the area of a cell's smallest face
+constexpr double kPerCell = 16;                  // points to the area of a cell's smallest face
 constexpr std::uint64_t kMostPoints = 1U << 16;  // on one triangle
 constexpr std::size_t kBlock = 256;
 
@@ -73,8 +73,7 @@ std::vector<Vote> surface_votes(const Tracer& tracer, const Lattice& lattice, co
   const std::size_t triangles = tracer.scene().mesh.triangles.size();
   std::vector<std::vector<Vote>> found((triangles + kBlock - 1) / kBlock);
   threads.for_blocks(triangles, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      voters.add_votes_of(static_cast<std::uint32_t>(t), found[begin / kBlock]);
+    for (std::size_t t = begin; t < end; ++t) voters.add_votes_of(static_cast<std::uint32_t>(t), found[begin / kBlock]);
   });
   std::vector<Vote> votes;
   for (const auto& own : found) votes.insert(votes.end(), own.begin(), own.end());

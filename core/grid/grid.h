@@ -1,6 +1,6 @@
 #pragma once
-// An irradiance vector grid as it is stored and read: parts of nine or twelve textures over a lattice, and which corners
-// of a cell a place may look at.
+// An irradiance vector grid as it is stored and read: parts of nine or twelve textures over a lattice, and which
+// corners of a cell a place may look at.
 //   E(p, n) = blend of the parts, each interpolated between the corners of p's cell that count there               (1)
 // Corners  A bit for each corner of the cell. At a surface the bits of the axis its normal is nearest to, so that the
 //          two sides of a thin wall look at different corners; a cut through the cell may part places of one direction,

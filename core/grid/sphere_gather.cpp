@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kSets = 8;
 constexpr float kSphere = 4 * std::numbers::pi_v<float>;  // its solid angle
-constexpr double kUniform = std::numbers::inv_pi / 4;      // density of the sphere's rays
+constexpr double kUniform = std::numbers::inv_pi / 4;     // density of the sphere's rays
 
 /// A random rotation: the local z axis anywhere, then any azimuth.
 LocalFrame turned(const DirectionSets& sets, std::uint64_t seed, std::uint64_t item) {

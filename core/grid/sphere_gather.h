@@ -49,8 +49,9 @@ class SphereGather {
     Random random;
     OctantSums sums;
     std::uint64_t& rays;
-    int sent = 0, backs = 0, open = 0;  // rays of the sphere; open: they met the sky, or a surface that light is known of
-    bool enclosed = false;              // most of the first rays met backs: senders must be seen to answer
+    int sent = 0, backs = 0,
+        open = 0;           // rays of the sphere; open: they met the sky, or a surface that light is known of
+    bool enclosed = false;  // most of the first rays met backs: senders must be seen to answer
   };
   void trace_batch(const LocalFrame&, int first, int end, Rays16& from, Work&) const;
   Vec3f look_along(const Vec3f& w, const Hit&, Work&) const;

@@ -218,9 +218,9 @@ class Solver {
     enum Reading : char { interpolated, own_row, enclosed };
     std::vector<char> reading(vertices_.size());
     for_each(vertices_.size(), [&](std::size_t v) {
-      reading[v] = is_enclosed(tracer_, out_.surface->faces(), vertices_[v])   ? enclosed
-                   : at_vertices_->cover(v) != Cover::functions ? own_row
-                                                                : interpolated;
+      reading[v] = is_enclosed(tracer_, out_.surface->faces(), vertices_[v]) ? enclosed
+                   : at_vertices_->cover(v) != Cover::functions              ? own_row
+                                                                             : interpolated;
     });
     for (const Reading kind : {own_row, enclosed}) {
       std::vector<TransferPoint> own;

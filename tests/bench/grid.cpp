@@ -55,9 +55,9 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
   const Box box = box_of(c.tracer.scene().mesh);
   for (const GridBlend blend : {GridBlend::exact, GridBlend::paper}) {
     const auto start = Clock::now();
-    const BakedGrid baked = bake_grid({c.tracer, surface.faces(), &surface, nullptr},
-                                      {.size = even_size(box.low, box.high, longest), .blend = blend, .rays = rays},
-                                      threads);
+    const BakedGrid baked =
+        bake_grid({c.tracer, surface.faces(), &surface, nullptr},
+                  {.size = even_size(box.low, box.high, longest), .blend = blend, .rays = rays}, threads);
     const double seconds = since(start);
     const Grid& grid = baked.grid;
     const auto [x, y, z] = grid.lattice.size;
@@ -66,19 +66,16 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
                   static_cast<unsigned long long>(baked.stats.rays), seconds,
                   1e-6 * static_cast<double>(baked.stats.rays) / seconds);
     const std::string name = blend == GridBlend::exact ? "exact" : "paper texels";
-    report(c, name + ", stored corners", more, [&](const Vec3f& p, const Vec3f& n) {
-      return irradiance_at(grid, to_double(p), n);
-    });
+    report(c, name + ", stored corners", more,
+           [&](const Vec3f& p, const Vec3f& n) { return irradiance_at(grid, to_double(p), n); });
     if (blend == GridBlend::paper) continue;
     report(c, name + ", stored corners, cubic", "", [&](const Vec3f& p, const Vec3f& n) {
       return irradiance_at(grid, to_double(p), n, GridPlace::surface, GridFilter::cubic);
     });
-    report(c, name + ", eighths of cells", "", [&](const Vec3f& p, const Vec3f& n) {
-      return irradiance_at(grid, to_double(p), n, GridPlace::room);
-    });
-    report(c, name + ", all corners", "", [&](const Vec3f& p, const Vec3f& n) {
-      return irradiance_at(grid, to_double(p), n, GridPlace::anywhere);
-    });
+    report(c, name + ", eighths of cells", "",
+           [&](const Vec3f& p, const Vec3f& n) { return irradiance_at(grid, to_double(p), n, GridPlace::room); });
+    report(c, name + ", all corners", "",
+           [&](const Vec3f& p, const Vec3f& n) { return irradiance_at(grid, to_double(p), n, GridPlace::anywhere); });
     const std::vector<Vec3f> stands = gather_places(grid.lattice, c.tracer.scene(), threads);
     Grid own = grid;
     report(c, name + ", a ray to each corner", "", [&](const Vec3f& p, const Vec3f& n) {
@@ -133,9 +130,10 @@ void run_rate(const Case& c, const LitSurface& surface, int longest, int rays, T
   const BakedGrid baked = bake_grid({c.tracer, surface.faces(), &surface, nullptr},
                                     {.size = lattice.size, .rays = rays, .corners = false}, threads);
   const double ours = 1e-6 * static_cast<double>(baked.stats.rays) / since(again);
-  std::printf("{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"longest\":%d,\"rays\":%d,\"embree_mrays_s\":%.2f,"
-              "\"bake_mrays_s\":%.2f,\"ratio\":%.3f}\n",
-              c.name, longest, rays, bare, ours, ours / bare);
+  std::printf(
+      "{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"longest\":%d,\"rays\":%d,\"embree_mrays_s\":%.2f,"
+      "\"bake_mrays_s\":%.2f,\"ratio\":%.3f}\n",
+      c.name, longest, rays, bare, ours, ours / bare);
 }
 
 }  // namespace

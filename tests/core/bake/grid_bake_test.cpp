@@ -15,8 +15,7 @@ using testing::file;
 using testing::input_of;
 using testing::report_of;
 
-constexpr const char* kSmall =
-    R"({"steps":[{"do":"grid","resolution":[12,12,12],"samples":256}],"quality":"draft"})";
+constexpr const char* kSmall = R"({"steps":[{"do":"grid","resolution":[12,12,12],"samples":256}],"quality":"draft"})";
 
 json baked_report(const std::string& scene, const std::string& recipe) {
   Threads threads;
@@ -78,10 +77,10 @@ TEST(GridBake, SaysWhenAPromiseCannotBeKept) {
 
 TEST(GridBake, OfPaperBlendHasTwelveTextures) {
   Threads threads;
-  const auto output = bake(
-      input_of("room",
-               R"({"steps":[{"do":"grid","resolution":[6,6,6],"samples":64,"blend":"paper"}],"quality":"draft"})"),
-      {}, threads);
+  const auto output =
+      bake(input_of("room",
+                    R"({"steps":[{"do":"grid","resolution":[6,6,6],"samples":64,"blend":"paper"}],"quality":"draft"})"),
+           {}, threads);
   ASSERT_TRUE(output) << output.error().message;
   const auto grid = read_grid_exr(file(*output, "grid.exr"), "grid.exr");
   ASSERT_TRUE(grid) << grid.error().message;
@@ -113,9 +112,9 @@ TEST(GridBake, PlanNamesTheGridAndItsBytesAreThoseOfTheFile) {
 
 TEST(GridBake, TooManyVerticesForTheMemoryAreRefusedWithNumbers) {
   Threads threads;
-  const auto output = bake(
-      input_of("room", R"({"steps":[{"do":"grid","resolution":[512,512,512]}],"limits":{"memory_mb":256}})"), {},
-      threads);
+  const auto output =
+      bake(input_of("room", R"({"steps":[{"do":"grid","resolution":[512,512,512]}],"limits":{"memory_mb":256}})"), {},
+           threads);
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().code, "memory_limit");
   EXPECT_NE(output.error().message.find("/steps/0/resolution"), std::string::npos);

@@ -48,11 +48,11 @@ TEST(CellCorners, KeepADarkRoomDarkBehindAWallThinnerThanACell) {
   Threads threads(2);
   const Tracer tracer(scene, threads);
   const RadiosityResult light = solve_radiosity(tracer, nullptr, {.points = {.wanted = 4000}}, threads);
-  const BakedGrid baked =
-      bake_grid({tracer, light.surface->faces(), light.surface.get(), nullptr}, {.size = {9, 6, 6}, .rays = 256}, threads);
+  const BakedGrid baked = bake_grid({tracer, light.surface->faces(), light.surface.get(), nullptr},
+                                    {.size = {9, 6, 6}, .rays = 256}, threads);
   const double lit = mean_light(scene, baked.grid, kLit, GridPlace::surface);
   EXPECT_NEAR(lit, 3.14159, 0.05 * 3.14159);  // a furnace of albedo 1/2: pi (1 / (1 - 1/2) - 1)
-  EXPECT_LT(mean_light(scene, baked.grid, kDark, GridPlace::surface), 0.01 * lit);  // the promise of issue 5
+  EXPECT_LT(mean_light(scene, baked.grid, kDark, GridPlace::surface), 0.01 * lit);   // the promise of issue 5
   EXPECT_GT(mean_light(scene, baked.grid, kDark, GridPlace::anywhere), 0.05 * lit);  // what would leak without
 }
 
@@ -75,7 +75,8 @@ TEST(CellCorners, AreThoseThatARayForEachLookUpFinds) {
       const auto& at = scene.mesh.position;
       const Vec3f p = at[a] * (1 - u - v) + at[b] * u + at[c] * v, n = scene.mesh.normal[a];
       const CellPlace place = place_in(lattice, to_double(p));
-      const std::uint8_t stored = cells[lattice.cell_index(place.cell)].surface[nearest_direction(n)].at(place.fraction);
+      const std::uint8_t stored =
+          cells[lattice.cell_index(place.cell)].surface[nearest_direction(n)].at(place.fraction);
       const std::uint8_t seen = corners_seen(tracer, lattice, stands, place, offset_origin(p, n));
       for (int k = 0; k < 8; ++k) same += (stored >> k & 1) == (seen >> k & 1) ? 1U : 0U;
       bits += 8;

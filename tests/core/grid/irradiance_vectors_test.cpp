@@ -111,8 +111,7 @@ TEST(IrradianceVectors, OfASingleRayAreItsClampedCosineAlongTheAxes) {
 
 TEST(IrradianceVectors, KeepColoursApart) {
   // Red from +x, blue from -x: each side sees its own.
-  const auto parts =
-      exact_parts(gathered([](const Vec3f& w) { return w.x > 0 ? Vec3f{1, 0, 0} : Vec3f{0, 0, 1}; }));
+  const auto parts = exact_parts(gathered([](const Vec3f& w) { return w.x > 0 ? Vec3f{1, 0, 0} : Vec3f{0, 0, 1}; }));
   EXPECT_NEAR(exact_irradiance(parts, {1, 0, 0}).x, kPi, kPi * kNear);
   EXPECT_NEAR(exact_irradiance(parts, {1, 0, 0}).z, 0, kPi * kNear);
   EXPECT_NEAR(exact_irradiance(parts, {-1, 0, 0}).z, kPi, kPi * kNear);

@@ -54,7 +54,7 @@ TEST(Grid, LinearInterpolationReproducesTrilinearFunctions) {
     Vec3d p;
     for (std::size_t axis = 0; axis < 3; ++axis)
       p[axis] = 0.5 + random.uniform_double() * (kLattice.size[axis] - 1);  // between the outermost vertices
-    EXPECT_NEAR(irradiance_at(grid, p, {1, 0, 0}).x, f(p), 3e-5);  // floats of about 20
+    EXPECT_NEAR(irradiance_at(grid, p, {1, 0, 0}).x, f(p), 3e-5);           // floats of about 20
   }
 }
 
