@@ -72,7 +72,8 @@ const readBall = (page) =>
     const gl = stage.renderer.getContext();
     const pixel = new Uint8Array(4);
     const at = (v, size) => Math.floor(((v + 1) / 2) * size);
-    gl.readPixels(at(screen.x, gl.drawingBufferWidth), at(screen.y, gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    const [x, y] = [at(screen.x, gl.drawingBufferWidth), at(screen.y, gl.drawingBufferHeight)];
+    gl.readPixels(x, y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     return {
       colour: [...pixel.slice(0, 3)].map((value) => value / 255),
       place: place.toArray(),
@@ -85,7 +86,8 @@ for (const at of ['0,0,0', '0.5,-0.6,0.3', '-0.9,0.9,-0.9', '0.2,-0.95,-0.4'])
   test(`the ball at ${at} of the grid is as bright as the file says`, () =>
     withViewer(`tone=none&ev=1&background=off&ballAt=${at}`, async (page) => {
       const { colour, place, normal, exposure } = await readBall(page);
-      const expected = irradianceAt(grid, place, normal, 'room').map((e) => encode(clamp((exposure * 0.8 * e) / Math.PI)));
+      const light = irradianceAt(grid, place, normal, 'room');
+      const expected = light.map((e) => encode(clamp((exposure * 0.8 * e) / Math.PI)));
       assert.ok(Math.max(...expected) > 0.05);
       // A step of 8 bits, half a step of dithering, and what the normal turns within a pixel.
       for (let c = 0; c < 3; ++c) assert.ok(Math.abs(colour[c] - expected[c]) < 3 / 255, `${colour} for ${expected}`);

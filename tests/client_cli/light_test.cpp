@@ -136,5 +136,32 @@ TEST_F(Light, CtrlCStopsALocalBakeWithOneHundredAndThirty) {
   EXPECT_EQ(ran.exit, 130) << ran.err;
 }
 
+TEST_F(Light, AGridIsAskedAsAnArtefactIsAndAgreesWithTheReflectedLightOfTheReference) {
+  // Of the demo's room, whose certificate says how far they may be apart.
+  const std::string room = folder.path("room.glb");
+  ASSERT_EQ(run_kiln({"demo-scene", "room", "-o", room}).exit, 0);
+  const std::string recipe =
+      folder.write("r.json", R"({"steps":[{"do":"grid","resolution":[10,10,10],"samples":256}],"quality":"draft"})");
+  const Ran baked = run_kiln({"bake", room, "-r", recipe, "-o", folder.path("out")});
+  ASSERT_EQ(baked.exit, 0) << baked.err;
+  EXPECT_NE(baked.err.find("of the grid"), std::string::npos);
+  const std::string points = draw(room, 300), grid = folder.path("out/grid.exr");
+  const ValueTable stored = values({"eval", grid, "--points", points});
+  const ValueTable truth = values({"reference", room, "--points", points, "--indirect", "--samples", "256"});
+  ASSERT_EQ(stored.values.size(), 300U);
+  double apart = 0, mean = 0;
+  for (std::size_t i = 0; i < 300; ++i) {
+    apart += std::pow(stored.values[i].irradiance.y - truth.values[i].irradiance.y, 2) / 300;
+    mean += truth.values[i].irradiance.y / 300;
+  }
+  const json report = json::parse(folder.read("out/report.json"));
+  const double certified = report["grid"]["certificate"]["interval"][1];
+  EXPECT_LT(std::sqrt(apart) / mean, 1.5 * certified + 0.05);  // other points, one channel, and the reference's noise
+  EXPECT_EQ(run_kiln({"eval", grid, "--points", points, "--env", "1,1,1"}).exit, 2);
+  const json facts = json::parse(run_kiln({"inspect", grid, "--json"}).out);
+  EXPECT_EQ(facts["kind"], "grid");
+  EXPECT_EQ(facts["grid"]["size"], (std::vector<int>{10, 10, 10}));
+}
+
 }  // namespace
 }  // namespace kiln

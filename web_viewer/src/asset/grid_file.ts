@@ -15,8 +15,8 @@ export interface GridFile {
   names: readonly string[]; // of the parts
   parts: Uint16Array[]; // RGBA halves, vertex (k * size.y + j) * size.x + i
   cells: Triple; // max(1, size - 1)
-  /// kCellBytes a cell: cut, bits below and bits above for +x -x +y -y +z -z, six unused, bits of eighths 0 to 7. Null: every
-  /// corner counts.
+  /// kCellBytes a cell: cut, bits below and bits above for +x -x +y -y +z -z, six unused, bits of eighths 0 to 7. Null:
+  /// every corner counts.
   corners: Uint8Array | null;
 }
 
@@ -46,7 +46,8 @@ export function readGrid(file: ArrayBuffer): GridFile {
   const text = (name: string) => String(header[name] ?? '');
   const triple = (name: string): Triple => {
     const numbers = text(name).split(' ').map(Number);
-    if (numbers.length !== 3 || !numbers.every(Number.isFinite)) throw new Error(`grid.exr: ${name} is not three numbers`);
+    if (numbers.length !== 3 || !numbers.every(Number.isFinite))
+      throw new Error(`grid.exr: ${name} is not three numbers`);
     return numbers as unknown as Triple;
   };
   if (text('kiln.grid') !== '1') throw new Error('grid.exr: kiln.grid is not 1');
@@ -105,8 +106,13 @@ function readCorners(find: (name: string) => Uint16Array, cells: number): Uint8A
 
 const clamp = (x: number, low: number, high: number): number => Math.min(high, Math.max(low, x));
 
-/// Irradiance of a receiver at `p` with unit normal `n`, as the README says it: the truth that the shader is tested against.
-export function irradianceAt(grid: GridFile, p: Triple, n: Triple, place: 'surface' | 'room'): [number, number, number] {
+/// Irradiance of a receiver at `p` with unit normal `n`, as the README says it: what the shader is tested against.
+export function irradianceAt(
+  grid: GridFile,
+  p: Triple,
+  n: Triple,
+  place: 'surface' | 'room',
+): [number, number, number] {
   const t = [0, 1, 2].map((a) => clamp((p[a] - grid.origin[a]) / grid.spacing[a], 0, grid.size[a] - 1));
   const cell = [0, 1, 2].map((a) => clamp(Math.floor(t[a]), 0, Math.max(0, grid.size[a] - 2)));
   const f = [0, 1, 2].map((a) => t[a] - cell[a]);

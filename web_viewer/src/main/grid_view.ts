@@ -1,5 +1,5 @@
-// What the viewer shows of an irradiance vector grid: surfaces lit by it alone, a ball that hangs in it, the boxes of the cells
-// of which not every corner counts, and an arrow at each vertex. Nothing is made before it is asked for.
+// What the viewer shows of an irradiance vector grid: surfaces lit by it alone, a ball that hangs in it, the boxes
+// of the cells of which not every corner counts, and an arrow at each vertex. Nothing is made before it is asked for.
 
 import {
   BufferAttribute,
@@ -130,12 +130,20 @@ function extent({ size, origin, spacing }: GridFile): { middle: Vector3; half: V
   return { half, middle: half.clone().add(new Vector3(...origin)).sub(new Vector3(...spacing).divideScalar(2)) };
 }
 
+const placeOf = (i: number, [x, y]: GridFile['size']): number[] => [
+  i % x,
+  Math.floor(i / x) % y,
+  Math.floor(i / (x * y)),
+];
+
 /// Twelve edges for each cell of which not every corner counts everywhere.
 function cellBoxes(grid: GridFile): LineSegments {
   const geometry = new InstancedBufferGeometry();
   const corner = (b: number) => [b & 1, (b >> 1) & 1, (b >> 2) & 1];
   const edges = [0, 1, 2].flatMap((axis) =>
-    [0, 1, 2, 3, 4, 5, 6, 7].filter((b) => !((b >> axis) & 1)).flatMap((b) => [...corner(b), ...corner(b | (1 << axis))]),
+    [0, 1, 2, 3, 4, 5, 6, 7]
+      .filter((b) => !((b >> axis) & 1))
+      .flatMap((b) => [...corner(b), ...corner(b | (1 << axis))]),
   );
   geometry.setAttribute('position', new BufferAttribute(Float32Array.from(edges), 3));
   geometry.setAttribute('cell', new InstancedBufferAttribute(Float32Array.from(partialCells(grid)), 3));
@@ -160,19 +168,19 @@ function partialCells({ corners, cells }: GridFile): number[] {
   for (let i = 0; i < corners.length / kCellBytes; ++i) {
     const bytes = corners.subarray(kCellBytes * i, kCellBytes * (i + 1));
     const whole = bytes.every((b, k) => b === 255 || (k < kRoomBytes && b === 0));
-    if (!whole) out.push(i % cells[0], Math.floor(i / cells[0]) % cells[1], Math.floor(i / (cells[0] * cells[1])));
+    if (!whole) out.push(...placeOf(i, cells));
   }
   return out;
 }
 
-/// A line at each vertex along the net flux (Phi, its channels together), as long as the light is one-sided, in its hue.
+/// A line at each vertex along the net flux (Phi, channels together), as long as the light is one-sided, in its hue.
 function vertexArrows(grid: GridFile): LineSegments {
   const count = grid.size[0] * grid.size[1] * grid.size[2];
   const [position, colour] = [new Float32Array(6 * count), new Float32Array(6 * count)];
   const length = 0.9 * Math.min(...grid.spacing);
   for (let v = 0; v < count; ++v) {
     const { flux, light } = vertexLight(grid, v);
-    const at = [v % grid.size[0], Math.floor(v / grid.size[0]) % grid.size[1], Math.floor(v / (grid.size[0] * grid.size[1]))];
+    const at = placeOf(v, grid.size);
     for (let a = 0; a < 3; ++a) {
       const start = grid.origin[a] + at[a] * grid.spacing[a];
       position[6 * v + a] = start;
@@ -191,7 +199,8 @@ function vertexLight(grid: GridFile, v: number): { flux: number[]; light: number
   const half = (part: number, c: number) => DataUtils.fromHalfFloat(grid.parts[part][4 * v + c]);
   const sum = (part: number) => half(part, 0) + half(part, 1) + half(part, 2);
   if (grid.blend === 'exact') {
-    const all = Math.max(1e-20, sum(3) + sum(4) + sum(5)) / 1.5; // integral of L |w_i| over the axes: 3/2 of that of L, if even
+    // Of even light each A_i is half of what comes from all sides.
+    const all = Math.max(1e-20, sum(3) + sum(4) + sum(5)) / 1.5;
     return {
       flux: [0, 1, 2].map((a) => sum(a) / all),
       light: [0, 1, 2].map((c) => half(3, c) + half(4, c) + half(5, c)),

@@ -63,6 +63,8 @@ export function encodeState(state: ViewState): string {
   return out.toString().replaceAll('%2C', ',');
 }
 
+const inside = (at: number[]): boolean => at.length === 3 && at.every((x) => Math.abs(x) <= 1);
+
 /// Reads what encodeState wrote. Whatever it does not understand keeps its default: an address is anyone's text.
 export function decodeState(text: string, lights: readonly string[]): ViewState {
   const from = new URLSearchParams(text);
@@ -89,7 +91,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
     ball: flag('ball'),
-    ballAt: ballAt.length === 3 && ballAt.every((x) => Math.abs(x) <= 1) ? (ballAt as unknown as ViewState['ballAt']) : null,
+    ballAt: inside(ballAt) ? (ballAt as unknown as ViewState['ballAt']) : null,
     cells: flag('cells'),
     arrows: flag('arrows'),
     compare: from.has('compare') ? number('compare', 0, 1) : null,
