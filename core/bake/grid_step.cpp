@@ -72,12 +72,20 @@ double seconds_a_ray(const Tracer& tracer, const GridBake& bake, Threads& thread
   return kReading * seconds / std::max(1.0, sent);
 }
 
+/// Shadow rays of cell_corners.h: sixteen points to a cell's face and one a triangle ask for eight corners each; of the
+/// cells a surface crosses each asks for 64. A room has about twice the walls of its box.
+double corner_rays(const Prediction& mesh, const GridBake& bake) {
+  const auto& [x, y, z] = bake.size;
+  const double faces = 4.0 * (double(x) * y + double(y) * z + double(z) * x);
+  return 8 * (16 * faces + static_cast<double>(mesh.triangles)) + 64 * faces;
+}
+
 /// Adds a grid of one size to a prediction. Bytes and memory by vertices, as measured by grid_bake_test.
 void add_prediction(Prediction& out, const GridBake& bake, double price) {
   const double vertices = vertices_of(bake.size), numbers = 3 * static_cast<double>(part_count(bake.blend));
   const double rays = vertices * bake.rays;
-  out.rays += whole(rays);
-  out.seconds += price * rays + 2e-6 * vertices;
+  out.rays += whole(rays + corner_rays(out, bake));
+  out.seconds += price * (rays + corner_rays(out, bake)) + 2e-6 * vertices;
   out.memory_bytes += whole(vertices * (16 * numbers + 64));
   out.artifact_bytes += whole(6000 + vertices * (1.75 * numbers + 2));
 }
