@@ -90,18 +90,30 @@ void add_prediction(Prediction& out, const GridBake& bake, double price) {
   out.artifact_bytes += whole(6000 + vertices * (1.75 * numbers + 2));
 }
 
-struct Baked {
-  BakedGrid grid;
-  Bytes file;
-  Grid decoded;
-};
-
-Result<Baked> bake_and_reopen(const GridTask& task, const GridBake& params, Threads& threads) {
-  Baked out{.grid = bake_grid(task.world, params, threads), .file = {}, .decoded = {}};
-  out.file = write_grid_exr(out.grid.grid, task.world.tracer.scene().frame, task.provenance);
+/// One grid: gathered, written, read back, certified. Replaces what `out` holds of the one before.
+Result<GridPass> bake_once(const GridTask& task, const GridBake& params, int bounces, double share, GridOutcome& out,
+                           BakeLog& log, Threads& threads) {
+  const double before = log.seconds();
+  log.begin("grid " + text_of(params.size), share);
+  const BakedGrid baked = bake_grid(task.world, params, threads);
+  out.file = write_grid_exr(baked.grid, task.world.tracer.scene().frame, task.provenance);
   KILN_TRY(decoded, read_grid_exr(out.file, "grid.exr"));
-  out.decoded = std::move(decoded);
-  return out;
+  log.count_rays(baked.stats.rays);
+  out.size = params.size;
+  out.rays = params.rays;
+  out.spacing = decoded.lattice.spacing;
+  out.stats = baked.stats;
+  GridPass pass{.size = params.size, .rays = baked.stats.rays};
+  if (task.recipe.certificate) {
+    log.begin("grid certificate", share + 0.02);
+    const bool thorough = bool{task.recipe.promise};
+    out.certificate = certify_grid({decoded, baked, task.world, params, bounces, thorough}, threads);
+    const ErrorStats& error = out.certificate->error;
+    pass.relrmse = error.relrmse, pass.low = error.interval_low, pass.high = error.interval_high;
+    log.know_error(error.relrmse);
+  }
+  pass.seconds = log.seconds() - before;
+  return pass;
 }
 
 /// Why there is no further pass, or nothing where there is one. `seconds` is what the whole bake has taken so far.
@@ -171,38 +183,18 @@ Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& lo
   params.progress = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
   double share = 0.6;
   for (int longest = kFirstLongest;; longest *= 2) {
-    const double before = log.seconds();
-    log.begin("grid " + text_of(params.size), share);
-    KILN_TRY(baked, bake_and_reopen(task, params, threads));
-    log.count_rays(baked.grid.stats.rays);
-    GridPass pass{.size = params.size, .rays = baked.grid.stats.rays};
-    if (task.recipe.certificate) {
-      log.begin("grid certificate", share + 0.02);
-      const bool thorough = bool{task.recipe.promise};
-      out.certificate =
-          certify_grid({baked.decoded, baked.grid, task.world, params, plan.radiosity->bounces, thorough}, threads);
-      const ErrorStats& error = out.certificate->error;
-      pass.relrmse = error.relrmse, pass.low = error.interval_low, pass.high = error.interval_high;
-      log.know_error(error.relrmse);
-    }
-    pass.seconds = log.seconds() - before;
+    KILN_TRY(pass, bake_once(task, params, plan.radiosity->bounces, share, out, log, threads));
     out.passes.push_back(pass);
-    out.file = std::move(baked.file);
-    out.size = params.size;
-    out.rays = params.rays;
-    out.spacing = baked.decoded.lattice.spacing;
-    out.stats = baked.grid.stats;
     if (!task.recipe.promise) break;
-    const std::array<int, 3> next = even_size(box.low, box.high, 2 * longest);
     GridBake finer = params;
-    finer.size = next;
+    finer.size = even_size(box.low, box.high, 2 * longest);
     Prediction more;
     add_prediction(more, finer, 0);
-    if (const auto ending = ending_of(task.recipe, pass, next, more.memory_bytes, log.seconds())) {
+    if (const auto ending = ending_of(task.recipe, pass, finer.size, more.memory_bytes, log.seconds())) {
       out.kept = ending->kept, out.ended_by = ending->ended_by, out.reason = ending->reason;
       break;
     }
-    params.size = next;
+    params = finer;
     share += 0.5 * (0.85 - share);
   }
   plan.grid->size = params.size;
