@@ -72,7 +72,6 @@ void SphereGather::trace_batch(const LocalFrame& frame, int first, int end, Rays
     for (std::size_t i = 0; i < kPacket; ++i) {
       const std::uint32_t triangle = hits[k].triangle[i];
       if (triangle == kNoHit) continue;
-      world_.faces.prefetch(triangle);
       if (world_.surface != nullptr) world_.surface->prefetch(triangle);
     }
   }

@@ -11,6 +11,7 @@ constexpr DirectRays kOnPaths{.lamps = {.few = 2, .many = 2}, .sky = kPacket};  
 
 LitSurface::LitSurface(const Tracer& tracer, const Environment* sky, const PointPlacement& placement, Threads& threads)
     : tracer_(tracer),
+      part_(tracer.scene().mesh.part.data()),
       faces_(tracer.scene()),
       albedo_(tracer.scene()),
       path_light_(tracer, sky, kOnPaths),

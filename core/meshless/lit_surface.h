@@ -35,10 +35,15 @@ class LitSurface {
   /// `enclosed` as in SenderPaths::follow.
   Reflected reflected(const Hit& hit, const Vec3f& direction, bool enclosed, Random&, std::uint64_t& rays) const;
   /// Asks for what reflected() will read of this triangle.
-  void prefetch(std::uint32_t triangle) const { senders_.prefetch(triangle); }
+  void prefetch(std::uint32_t triangle) const {
+    faces_.prefetch(triangle);
+    senders_.prefetch(triangle);
+    __builtin_prefetch(&part_[triangle]);
+  }
 
  private:
   const Tracer& tracer_;
+  const std::uint32_t* part_;  // of each triangle
   GatherFaces faces_;
   HitAlbedo albedo_;
   DirectLight path_light_;  // on the way of a ray
