@@ -23,8 +23,7 @@ class DirectionSets {
  public:
   /// `samples` is rounded up to a multiple of kPacket. `order` 0: directions only. `first` rays make the first round,
   /// twice as many the first two, and so on; all rays are one round where it is 0.
-  DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first = 0,
-                Spread = Spread::cosine);
+  DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first = 0, Spread = Spread::cosine);
 
   int samples() const { return samples_; }
   int row_width() const { return row_width_; }
