@@ -29,9 +29,11 @@ struct Baked {
   RadiosityResult light;
   BakedGrid grid;
 
-  Baked(const Scene& scene, const Environment* sky, const GridBake& params)
-      : tracer(scene, threads), light(solve_radiosity(tracer, sky, {.points = {.wanted = 4000}}, threads)) {
-    grid = bake_grid({tracer, light.surface->faces(), light.surface.get(), sky}, params, threads);
+  Baked(const Scene& scene, const Environment* sky, const GridBake& params, int bounces = -1)
+      : tracer(scene, threads),
+        light(solve_radiosity(tracer, sky, {.points = {.wanted = 4000}, .bounces = bounces}, threads)) {
+    const GatherFaces faces(scene);
+    grid = bake_grid({tracer, faces, light.surface.get(), sky}, params, threads);
   }
   float at(const Vec3d& p, const Vec3f& n) const { return irradiance_at(grid.grid, p, n).x; }
 };
@@ -48,6 +50,15 @@ TEST(BakeGrid, InAWhiteFurnaceIndirectLightIsTheGeometricSeriesWithoutItsFirstTe
     }
   }
   EXPECT_EQ(baked.grid.stats.invalid, 0U);
+}
+
+TEST(BakeGrid, HoldsAsManyReflectionsAsAreAskedFor) {
+  const Scene scene = furnace(0.5F);
+  const float terms[] = {0, 0.5F, 0.75F, 0.875F};
+  for (int bounces = 0; bounces < 4; ++bounces) {
+    const Baked baked(scene, nullptr, {.size = {2, 2, 2}, .rays = 256}, bounces);
+    EXPECT_NEAR(baked.at({0, 0, 0}, {0, 1, 0}), kPi * terms[bounces], 0.02F * kPi) << bounces;
+  }
 }
 
 TEST(BakeGrid, InAWhiteFurnaceAllLightIsTheWholeSeries) {
