@@ -174,4 +174,12 @@ export interface Report {
     seen?: { relrmse: number; interval?: [number, number] }; // at the points that can be seen, when some cannot
     job_light?: { relrmse: number; interval?: [number, number] }; // its own light in full detail, lamps and all
   };
+  grid?: {
+    size: [number, number, number];
+    blend: string;
+    content: string;
+    bytes: number;
+    rays_per_vertex: number;
+    certificate: { relrmse: number; interval?: [number, number]; sources?: Record<string, number> } | null;
+  };
 }

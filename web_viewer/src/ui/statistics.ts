@@ -12,6 +12,7 @@ export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   if (!report) return box;
   if (report.certificate?.relrmse !== undefined)
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
+  if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
   if (report.warnings?.length)
     box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
   if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
@@ -69,6 +70,19 @@ function certificate(c: NonNullable<Report['certificate']>, from: Report['error_
     h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval(c.interval)}`),
     pairs(rows),
   );
+}
+
+function grid(of: NonNullable<Report['grid']>): Row[] {
+  const { size, blend, content, bytes: file, rays_per_vertex: rays, certificate: c } = of;
+  const from = (name: string): string => percent(c?.sources?.[name]);
+  return [
+    ['Vertices', size.join(' × ')],
+    ['Light', `${content}, ${blend} blend`],
+    ['File', bytes(file)],
+    ['Rays per vertex', count(rays)],
+    ...(c ? [['Relative error', withInterval(c)] as const] : []),
+    ['from noise, lattice, storage', ['noise', 'lattice', 'storage'].map(from).join(', ')],
+  ];
 }
 
 function warnings(list: NonNullable<Report['warnings']>): HTMLElement {
