@@ -106,8 +106,12 @@ Result<GridPass> bake_once(const GridTask& task, const GridBake& params, int bou
   GridPass pass{.size = params.size, .rays = baked.stats.rays};
   if (task.recipe.certificate) {
     log.begin("grid certificate", share + 0.02);
-    const bool thorough = bool{task.recipe.promise};
-    out.certificate = certify_grid({decoded, baked, task.world, params, bounces, thorough}, threads);
+    // A quick look tells that a target is far; what says that it is met has to be thorough.
+    const auto certify = [&](bool thorough) {
+      out.certificate = certify_grid({decoded, baked, task.world, params, bounces, thorough}, threads);
+    };
+    certify(false);
+    if (out.certificate->error.relrmse <= task.recipe.promise.target_error.value_or(0)) certify(true);
     const ErrorStats& error = out.certificate->error;
     pass.relrmse = error.relrmse, pass.low = error.interval_low, pass.high = error.interval_high;
     log.know_error(error.relrmse);
