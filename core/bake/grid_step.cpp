@@ -6,6 +6,10 @@
 
 #include "core/artifact/grid_exr.h"
 #include "core/bake/radiosity_step.h"
+#include "core/bake/surface_samples.h"
+#include "core/prt/ray_origin.h"
+#include "core/sphere/sampling.h"
+#include "core/trace/surface.h"
 
 namespace kiln {
 namespace {
@@ -48,6 +52,33 @@ std::string percent(double x) {
 double vertices_of(const std::array<int, 3>& size) { return double(size[0]) * size[1] * size[2]; }
 
 std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
+
+/// How far rays see: the median distance of cosine rays from points all over the surface, in lengths of the unit cube.
+double median_reach(const Tracer& tracer) {
+  constexpr std::size_t kPoints = 512;
+  std::vector<float> reach;
+  for (const SurfaceSample& s : sample_surface(tracer.scene().mesh, kPoints, 0x7265616368)) {
+    const SurfacePoint p = surface_point(tracer.scene(), s.triangle, s.u, s.v);
+    const Basis<float> basis = basis_around(p.normal);
+    const Vec3f from = offset_origin(p.position, p.geometric_normal);
+    for (std::uint32_t k = 0; k < 8; ++k) {
+      const Vec3f w = normalized(basis.to_world(cosine_hemisphere(sobol_owen(k, s.triangle))));
+      const Hit hit = tracer.closest(from, w, kFar);
+      reach.push_back(hit ? hit.t : kFar);
+    }
+  }
+  if (reach.empty()) return kFar;
+  const auto middle = reach.begin() + static_cast<std::ptrdiff_t>(reach.size() / 2);
+  std::nth_element(reach.begin(), middle, reach.end());
+  return *middle;
+}
+
+/// A scene of many rooms needs the vertices of each: in a single one rays reach about half of its side. At most
+/// kMostRooms times as many along a side, for time and memory.
+int longest_side(const GridEffort& effort, double reach) {
+  constexpr double kRoomReach = 0.5, kMostRooms = 4;
+  return static_cast<int>(effort.longest * std::clamp(kRoomReach / std::max(reach, 1e-6), 1.0, kMostRooms));
+}
 
 /// Seconds of one ray of a gather: some of the planned ones, sent from all over the lattice. What they would read where
 /// they land costs as much again (kiln_grid_bench).
@@ -153,17 +184,20 @@ Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment*
   Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, surface, sky, threads);
   const GridEffort effort = grid_effort(recipe);
   const Box box = box_of(scene.mesh);
-  plan.grid = GridBake{.size = step.resolution.value_or(even_size(box.low, box.high, effort.longest)),
+  const Tracer tracer(scene, threads);
+  const double reach = median_reach(tracer);
+  const int longest = recipe.promise ? effort.longest : longest_side(effort, reach);
+  plan.grid = GridBake{.size = step.resolution.value_or(even_size(box.low, box.high, longest)),
                        .blend = step.blend,
                        .content = step.content,
                        .rays = step.samples.value_or(effort.rays)};
   const GridBake& grid = *plan.grid;
   const std::string asked = "asked for by the recipe";
-  decide(plan, "resolution", text_of(grid.size),
-         step.resolution  ? asked
-         : recipe.promise ? "the first pass; doubled until the promise is kept"
-                          : effort.reason + std::string(" has ") + std::to_string(effort.longest) +
-                                " vertices along the longest side");
+  std::string reason = effort.reason + std::string(" has ") + std::to_string(effort.longest) +
+                       " vertices along the side of a room; half of the rays that leave a surface end within " +
+                       percent(reach) + " of the scene's longest side";
+  if (recipe.promise) reason = "the first pass; doubled until the promise is kept";
+  decide(plan, "resolution", text_of(grid.size), step.resolution ? asked : reason);
   decide(plan, "content", step.content == GridContent::all ? "all" : "indirect",
          step.content == GridContent::all ? "lamps and sky are in the grid too"
                                           : "direct light is left to the renderer, which knows it sharper");
@@ -174,7 +208,6 @@ Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment*
   decide(plan, "grid rays", std::to_string(grid.rays), step.samples ? asked : effort.reason);
   if (step.bounces == 0 && step.content == GridContent::indirect)
     decide(plan, "grid light", "none", "no reflections were asked for, and direct light is not in this grid");
-  const Tracer tracer(scene, threads);
   add_prediction(plan.prediction, grid, seconds_a_ray(tracer, grid, threads));
   return plan;
 }
