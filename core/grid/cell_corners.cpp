@@ -8,6 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/meshless/points.h"
 #include "core/sphere/sampling.h"
 #include "core/trace/surface.h"
 
@@ -17,11 +18,14 @@ namespace {
 constexpr double kPerCell = 16;                  // points to the area of a cell's smallest face
 constexpr std::uint64_t kMostPoints = 1U << 16;  // on one triangle
 constexpr std::size_t kBlock = 256;
+constexpr int kOpenWeight = 8;  // of places in the open: where they share a cell with the inside of a solid, which
+                                // nobody sees, its darkness must not reach out from under it
 
 /// One point of a surface: which corners its side sees.
 struct Vote {
   std::uint64_t key = 0;  // cell x 6 + direction
   std::uint8_t seen = 0;
+  int weight = 1;
   std::array<double, 3> fraction{};  // its place in the cell
 };
 using Votes = std::span<const Vote>;
@@ -38,7 +42,7 @@ std::uint64_t points_on(double area, double face) {
 class Voters {
  public:
   Voters(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands)
-      : tracer_(tracer), lattice_(lattice), stands_(stands), face_(smallest_face(lattice)) {}
+      : tracer_(tracer), lattice_(lattice), stands_(stands), faces_(tracer.scene()), face_(smallest_face(lattice)) {}
 
   void add_votes_of(std::uint32_t triangle, std::vector<Vote>& votes) const {
     const Scene& scene = tracer_.scene();
@@ -58,12 +62,17 @@ class Voters {
   Vote vote(const Vec3f& position, const Vec3f& normal, const Vec3f& face) const {
     const CellPlace place = place_in(lattice_, to_double(position));
     const std::uint8_t seen = corners_seen(tracer_, lattice_, stands_, place, offset_origin(position, face));
-    return {lattice_.cell_index(place.cell) * kDirections + nearest_direction(normal), seen, place.fraction};
+    const bool enclosed = is_enclosed(tracer_, faces_, {position, normal, position, face});
+    return {.key = lattice_.cell_index(place.cell) * kDirections + nearest_direction(normal),
+            .seen = seen,
+            .weight = enclosed ? 1 : kOpenWeight,
+            .fraction = place.fraction};
   }
 
   const Tracer& tracer_;
   const Lattice& lattice_;
   const std::vector<Vec3f>& stands_;
+  GatherFaces faces_;
   double face_;
 };
 
@@ -89,8 +98,8 @@ struct Tally {
   int votes = 0;
 
   void add(const Vote& v) {
-    ++votes;
-    for (std::size_t k = 0; k < 8; ++k) seen[k] += v.seen >> k & 1;
+    votes += v.weight;
+    for (std::size_t k = 0; k < 8; ++k) seen[k] += (v.seen >> k & 1) * v.weight;
   }
   /// The corners that at least half of the votes see.
   std::uint8_t majority() const {
@@ -203,7 +212,7 @@ std::vector<CellCorners> find_cell_corners(const Tracer& tracer, const Lattice& 
       cells[key / kDirections].surface[key % kDirections] = best_cut(groups[i]);
     }
   });
-  rays += asked + 8 * votes.size();
+  rays += asked + 9 * votes.size();
   return cells;
 }
 

@@ -9,7 +9,7 @@
 // Rooms     In cells that a triangle passes through, the middle of each eighth asks. All corners count elsewhere.
 // Beats     plane tests and moving the look-up (shared notes, measured); a ray for every look-up is the truth it is
 //           tested against.
-// Cost      8 rays for each point; 64 for each cell that a surface passes through.   Repeat  same bits for any thread
+// Cost      9 rays for each point; 64 for each cell that a surface passes through.   Repeat  same bits for any thread
 // count
 
 #include <vector>
