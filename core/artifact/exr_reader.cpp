@@ -84,7 +84,7 @@ constexpr const char* kChannels[] = {"R", "G", "B", "A"};
 bool is_scanline_parts(Span file) { return looks_like_exr_parts(file) && (file[5] & (0x02 | 0x08)) == 0; }
 
 Result<ExrPart> describe_part(const Imf::Header& header, const std::string& name) {
-  const Imath::Box2i window = header.dataWindow();
+  const Imath::Box2i& window = header.dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
                      height = std::int64_t{window.max.y} - window.min.y + 1;
   if (!header.hasName() || window.min != Imath::V2i(0, 0) || width < 1 || height < 1)
