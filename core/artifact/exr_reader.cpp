@@ -79,6 +79,7 @@ Result<Environment> read_pixels(Span file, const std::string& name) {
 }
 
 constexpr const char* kChannels[] = {"R", "G", "B", "A"};
+constexpr std::uint64_t kMostInflation = 600;  // pixels from a byte: deflate makes 1032 bytes at most, a half has two
 
 /// Version 2 with multi-part 0x1000, but neither tiled 0x200 nor deep 0x800.
 bool is_scanline_parts(Span file) { return looks_like_exr_parts(file) && (file[5] & (0x02 | 0x08)) == 0; }
@@ -128,8 +129,8 @@ Result<std::vector<ExrPart>> read_parts(Span file, const std::string& name, cons
   for (int i = 0; i < input.parts(); ++i) {
     KILN_TRY(part, describe_part(input.header(i), name));
     pixels += static_cast<std::uint64_t>(part.width) * static_cast<std::uint64_t>(part.height);
-    if (pixels > limits.most_pixels)
-      return fault("image_too_large", "The parts have more than " + std::to_string(limits.most_pixels) + " pixels.",
+    if (pixels > std::min<std::uint64_t>(limits.most_pixels, kMostInflation * file.size()))
+      return fault("image_too_large", "The parts have more pixels than are allowed or than such a file can hold.",
                    name);
     out.push_back(std::move(part));
   }
