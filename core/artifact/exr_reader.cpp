@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
+#include <string_view>
 
 #include "core/artifact/exr_parts.h"
 #include "core/artifact/hdr_reader.h"
@@ -84,6 +86,49 @@ constexpr std::uint64_t kMostInflation = 600;  // pixels from a byte: deflate ma
 /// Version 2 with multi-part 0x1000, but neither tiled 0x200 nor deep 0x800.
 bool is_scanline_parts(Span file) { return looks_like_exr_parts(file) && (file[5] & (0x02 | 0x08)) == 0; }
 
+/// The NUL-terminated text at `at`, which is moved behind it; nothing when it does not end within 255 bytes.
+std::optional<std::string_view> take_text(Span file, std::size_t& at) {
+  const auto rest = file.subspan(std::min(at, file.size()));
+  const auto end =
+      std::find(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(256, rest.size())), 0);
+  if (end == rest.end() || *end != 0) return std::nullopt;
+  const auto length = static_cast<std::size_t>(end - rest.begin());
+  at += length + 1;
+  return std::string_view(reinterpret_cast<const char*>(rest.data()), length);
+}
+
+std::int64_t int_at(Span file, std::size_t at) {
+  std::int32_t value = 0;
+  std::memcpy(&value, file.data() + at, sizeof value);
+  return value;
+}
+
+/// Whether no header speaks of more than a file of this size can hold: OpenEXR makes room before it reads.
+bool headers_fit(Span file) {
+  const auto most = static_cast<std::int64_t>(kMostInflation * file.size());
+  for (std::size_t at = 8; at < file.size();) {
+    if (file[at] == 0) return true;  // the empty header behind the last one
+    while (at < file.size() && file[at] != 0) {
+      const auto name = take_text(file, at);
+      const auto type = take_text(file, at);
+      if (!name || !type || file.size() - std::min(at, file.size()) < 4) return false;
+      const std::int64_t size = int_at(file, at);
+      at += 4;
+      if (size < 0 || static_cast<std::uint64_t>(size) > file.size() - at) return false;
+      if (*name == "chunkCount" && (size != 4 || int_at(file, at) < 1 || int_at(file, at) > most)) return false;
+      if (*name == "dataWindow" || *name == "displayWindow") {
+        if (size != 16) return false;
+        const std::int64_t width = int_at(file, at + 8) - int_at(file, at) + 1,
+                           height = int_at(file, at + 12) - int_at(file, at + 4) + 1;
+        if (width < 1 || height < 1 || width > most || height > most / width) return false;
+      }
+      at += static_cast<std::size_t>(size);
+    }
+    ++at;
+  }
+  return false;
+}
+
 Result<ExrPart> describe_part(const Imf::Header& header, const std::string& name) {
   const Imath::Box2i& window = header.dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
@@ -147,6 +192,8 @@ bool looks_like_exr_parts(Span file) {
 Result<std::vector<ExrPart>> read_exr_parts(Span file, const std::string& name, const ExrLimits& limits) {
   if (!is_scanline_parts(file))
     return fault("exr_unsupported", "Only multi-part files of plain scan lines are read here.", name);
+  if (!headers_fit(file))
+    return fault("exr_invalid", "The headers are damaged or speak of more than the file holds.", name);
   try {
     return read_parts(file, name, limits);
   } catch (const std::exception&) {
