@@ -34,6 +34,7 @@ struct TransferEncoding {
   Components components;       // none: raw
   std::vector<float> weights;  // of the components, rank for each vertex
   double weight_step = 0;      // weights are rounded to steps of at most this; 0: to `bits`
+  double lamp_step = 0;        // the light of lamps likewise: near a lamp it may be a thousand times its mean
 };
 
 struct Encoding {

@@ -58,6 +58,7 @@ class StoredTransfer {
   const float* numbers_of(std::size_t vertex) const;
   void measure_ranges(std::span<const std::uint32_t> vertices);
   void choose_bits(const TransferEncoding&);
+  bool is_lamp(std::size_t number) const;
 
   const Transfer& transfer_;
   StoredForm form_;
