@@ -12,6 +12,7 @@
 #include "core/sphere/sampling.h"
 #include "core/sphere/sh.h"
 #include "core/trace/environment_sampler.h"
+#include "core/trace/ggx.h"
 #include "core/trace/lights.h"
 #include "core/trace/surface.h"
 
@@ -69,6 +70,9 @@ class Estimator {
   /// Adds one path from `start` to sum[lighting]. Returns its vertices.
   int add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
+  /// The same, reflected to the eye by the lobe of `point` first.
+  int add_specular_path(const EyedPoint& point, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+
   std::uint64_t rays_per_vertex() const {
     std::uint64_t rays = 1;
     for (const EnvironmentSampler& sampler : samplers_) rays += sampler.useful() ? 1 : 0;
@@ -77,6 +81,12 @@ class Estimator {
   }
 
  private:
+  struct Seen {
+    Vertex at;
+    Basis<double> basis;
+    Vec3d view;  // in it
+  };
+  void add_specular_sky(const EyedPoint&, const Seen&, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_lamps(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   Vec3d emitter_light(const Vertex&, double pick, const Vec2<double>& u) const;
@@ -202,10 +212,84 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
   return depth + 1;
 }
 
+Vec3d fresnel(const Vec3d& f0, const Vec3d& v, const Vec3d& l) {
+  return f0 + (Vec3d{1, 1, 1} - f0) * schlick_weight(v, l);
+}
+
+void Estimator::add_specular_sky(const EyedPoint& point, const Seen& seen, PathNumbers& numbers,
+                                 std::vector<Vec3d>& sum) const {
+  for (std::size_t k = 0; k < samplers_.size(); ++k) {
+    if (!samplers_[k].useful()) continue;
+    const Vec3d w = samplers_[k].sample(numbers.pair(0)), l = seen.basis.to_local(w);
+    const double lobe = ggx_cosine(point.alpha, seen.view, l);
+    if (lobe <= 0 || tracer_.occluded(lifted(seen.at), to_float(w), kFar)) continue;
+    const double density = samplers_[k].density(w) + ggx_density(point.alpha, seen.view, l);
+    sum[k] += times(fresnel(point.f0, seen.view, l) * (lobe / density),
+                    environment_radiance(light_.environments[k], to_float(w)));
+  }
+}
+
+int Estimator::add_specular_path(const EyedPoint& point, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+  const Vec3d normal = normalized(to_double(point.at.normal));
+  const Basis<double> basis = basis_around(normal);
+  const Seen seen{{to_double(point.at.position), normal, to_double(point.at.face_normal)},
+                  basis,
+                  basis.to_local(normalized(to_double(point.view)))};
+  if (!(seen.view.z > 0)) return 1;
+  const GgxSample s = sample_ggx(point.alpha, seen.view, numbers.pair(0));
+  add_specular_sky(point, seen, numbers, sum);
+  if (!(s.weight > 0)) return 1;
+  const Vec3d weight = fresnel(point.f0, seen.view, s.l) * s.weight, w = normalized(basis.to_world(s.l));
+  const Hit hit = tracer_.closest(lifted(seen.at), to_float(w), kFar);
+  if (!hit) {
+    add_sky(w, ggx_density(point.alpha, seen.view, s.l), weight, sum);
+    return 1;
+  }
+  const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
+  const Part& part = scene_.parts[scene_.mesh.part[hit.triangle]];
+  if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) return 1;
+  if (light_.scene_lights) sum.back() += times(weight, emission_at(scene_, p));
+  const double side = hit.back ? -1 : 1;
+  std::vector<Vec3d> there(sum.size());
+  const int visited = add_path(
+      {to_double(p.position), to_double(p.normal) * side, to_double(p.geometric_normal) * side}, numbers, there);
+  for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += times(weight, albedo_at(scene_, p)) * there[k];
+  return 1 + visited;
+}
+
 void check_light(const ReferenceLight& light) {
   EXPECTS(light.sh.empty() || (light.sh_order >= 1 && light.sh_order <= kMaxShOrder));
   for (const auto& coefficients : light.sh)
     EXPECTS(coefficients.size() == static_cast<std::size_t>(sh_count(light.sh_order)));
+}
+
+/// add(point, numbers, sum) for each sample of each point; it returns the vertices it visited.
+template <class Add>
+ReferenceResult estimate(const Estimator& estimator, std::size_t points, const ReferenceOptions& options,
+                         Threads& threads, const Add& add) {
+  const std::size_t lightings = estimator.lightings();
+  const int half = (options.samples + 1) / 2;
+  const std::vector<Vec3d> zero(lightings * points);
+  ReferenceResult result{zero, zero, zero};
+  std::atomic<std::uint64_t> vertices = 0;
+
+  threads.for_blocks(points, 1, [&](std::size_t point, std::size_t) {
+    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
+    std::uint64_t visited = 0;
+    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
+      PathNumbers numbers(options.seed, point, sample);
+      visited += static_cast<std::uint64_t>(add(point, numbers, sums[sample % 2]));
+    }
+    vertices += visited;
+    for (std::size_t k = 0; k < lightings; ++k) {
+      const std::size_t i = k * points + point;
+      result.half_a[i] = sums[0][k] / half;
+      result.half_b[i] = sums[1][k] / half;
+      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
+    }
+  });
+  result.rays = vertices * estimator.rays_per_vertex();
+  return result;
 }
 
 }  // namespace
@@ -215,31 +299,24 @@ ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferenceP
   EXPECTS(options.samples >= 1);
   check_light(light);
   const Estimator estimator(tracer, light, options);
-  const std::size_t lightings = estimator.lightings();
-  const int half = (options.samples + 1) / 2;
-  const std::vector<Vec3d> zero(lightings * points.size());
-  ReferenceResult result{zero, zero, zero};
-  std::atomic<std::uint64_t> vertices = 0;
+  return estimate(
+      estimator, points.size(), options, threads,
+      [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+        const ReferencePoint& p = points[point];
+        const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
+        return estimator.add_path(start, numbers, sum);
+      });
+}
 
-  threads.for_blocks(points.size(), 1, [&](std::size_t point, std::size_t) {
-    const ReferencePoint& p = points[point];
-    const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
-    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
-    std::uint64_t visited = 0;
-    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
-      PathNumbers numbers(options.seed, point, sample);
-      visited += static_cast<std::uint64_t>(estimator.add_path(start, numbers, sums[sample % 2]));
-    }
-    vertices += visited;
-    for (std::size_t k = 0; k < lightings; ++k) {
-      const std::size_t i = k * points.size() + point;
-      result.half_a[i] = sums[0][k] / half;
-      result.half_b[i] = sums[1][k] / half;
-      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
-    }
-  });
-  result.rays = vertices * estimator.rays_per_vertex();
-  return result;
+ReferenceResult trace_specular(const Tracer& tracer, std::span<const EyedPoint> points, const ReferenceLight& light,
+                               const ReferenceOptions& options, Threads& threads) {
+  EXPECTS(options.samples >= 1);
+  check_light(light);
+  const Estimator estimator(tracer, light, options);
+  return estimate(estimator, points.size(), options, threads,
+                  [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+                    return estimator.add_specular_path(points[point], numbers, sum);
+                  });
 }
 
 }  // namespace kiln

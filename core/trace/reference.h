@@ -54,4 +54,22 @@ struct ReferenceResult {
 ReferenceResult trace_reference(const Tracer&, std::span<const ReferencePoint>, const ReferenceLight&,
                                 const ReferenceOptions&, Threads&);
 
+/// A point seen by an eye, and what it is made of (core/trace/ggx.h).
+struct EyedPoint {
+  ReferencePoint at;
+  Vec3f view;  // unit, towards the eye
+  double alpha = 1;
+  Vec3d f0;
+};
+
+/// Radiance that the GGX lobe of each point sends to its eye: as above, but the first reflection is specular and the
+/// value is
+///   integral over the hemisphere of n of L(x, w) f(view, w) (n.w) dw,  f of ggx.h
+/// All later reflections are diffuse. The last lighting is what the lobe shows of emitters and of surfaces that lamps
+/// light; the highlights of punctual lights themselves are left out.
+/// Method  visible normals drawn, and one ray to each environment map, joined by the balance heuristic; emitters are
+///         found by the path alone.
+ReferenceResult trace_specular(const Tracer&, std::span<const EyedPoint>, const ReferenceLight&,
+                               const ReferenceOptions&, Threads&);
+
 }  // namespace kiln
