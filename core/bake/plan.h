@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/bake/forecast.h"
+#include "core/bake/glossy_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/prt/subdivide.h"
@@ -34,7 +35,9 @@ struct Plan {
   PrtStep::Encoding encoding;
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
+  GlossyPlan glossy;
   std::vector<Decision> decisions;
+  std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;
   Prediction prediction;
 };

@@ -1,0 +1,157 @@
+// Specular parts: which get matrices, what they show, and that other scenes are left alone.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/artifact/baked_scene.h"
+#include "core/artifact/glb.h"
+#include "core/bake/glossy_plan.h"
+#include "tests/core/bake/bake_input.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+using testing::file;
+using testing::input_of;
+using testing::report_of;
+
+/// A bundled scene with other finishes: {"knot": {"metallicFactor": 1, "roughnessFactor": 0.5}}.
+BakeInput finished(const std::string& scene, const std::string& recipe, const json& finishes) {
+  BakeInput input = input_of(scene, recipe);
+  const auto chunks = split_glb(input.scene.main);
+  json document = json::parse(chunks->json);
+  for (json& material : document["materials"]) {
+    const std::string name = material["name"];
+    if (finishes.contains(name)) material["pbrMetallicRoughness"].update(finishes[name]);
+  }
+  input.scene.main = *join_glb(document.dump(), Bytes(chunks->binary.begin(), chunks->binary.end()));
+  return input;
+}
+
+std::string small(const std::string& more = "") {
+  return R"({"environment":{"builtin":"overcast"},"quality":"draft","steps":[{"do":"prt","samples":256,"bounces":2,"subdivide":{"triangles":4000})" +
+         more + "}]}";
+}
+
+const json kMetalKnot = {{"knot", {{"metallicFactor", 1}, {"roughnessFactor", 0.5}}}};
+
+Scene scene_with(const std::vector<std::array<float, 2>>& metallic_roughness) {
+  Scene scene;
+  scene.mesh.position = {{0, 0, 0}, {0.1F, 0, 0}, {0, 0.1F, 0}};
+  scene.mesh.normal.assign(3, {0, 0, 1});
+  for (const auto& [metallic, roughness] : metallic_roughness) {
+    scene.mesh.triangles.push_back({0, 1, 2});
+    scene.mesh.part.push_back(static_cast<std::uint32_t>(scene.parts.size()));
+    scene.parts.push_back({.name = "part", .material = static_cast<int>(scene.materials.size())});
+    scene.materials.push_back(
+        {.name = "m" + std::to_string(scene.parts.size()), .metallic = metallic, .roughness = roughness});
+  }
+  return scene;
+}
+
+TEST(GlossyPlan, MetalsUpToAPointAndSmoothSurfacesAreSpecular) {
+  const Scene scene = scene_with({{1, 1}, {1, 0.7F}, {1, 0.71F}, {0, 0.4F}, {0, 0.5F}, {0.4F, 0.5F}});
+  std::vector<bool> found;
+  for (const PartFinish& f : find_specular_parts(scene, false)) found.push_back(f.specular);
+  EXPECT_EQ(found, (std::vector<bool>{false, true, false, true, false, false}));
+  for (const PartFinish& f : find_specular_parts(scene, true)) EXPECT_TRUE(f.specular);
+}
+
+TEST(GlossyPlan, UnlitPartsNeverAreAndATextureCountsWhereItIsSmooth) {
+  Scene scene = scene_with({{1, 0.2F}, {1, 1}});
+  scene.materials[0].unlit = true;
+  scene.images.push_back({"finish", "image/png", {}, 1, 1, {255, 51, 255, 255}});
+  scene.textures.push_back({0});
+  EXPECT_FALSE(find_specular_parts(scene, true)[0].specular);
+  EXPECT_FALSE(find_specular_parts(scene, false)[1].specular);
+  scene.materials[1].metallic_roughness_texture.texture = 0;
+  const PartFinish finish = find_specular_parts(scene, false)[1];
+  EXPECT_TRUE(finish.specular);
+  EXPECT_NEAR(finish.smoothest, 0.2, 1e-6);
+}
+
+TEST(GlossyPlan, SaysWhatItDecidedAndWarnsOfLobesSharperThanItsBands) {
+  const auto none = plan_glossy(scene_with({{1, 1}}), PrtStep::Glossy::automatic, 6);
+  EXPECT_FALSE(none.plan);
+  EXPECT_EQ(none.value, "skipped");
+  const auto some = plan_glossy(scene_with({{1, 1}, {1, 0.5F}}), PrtStep::Glossy::automatic, 6);
+  EXPECT_EQ(some.plan.order, 5);
+  EXPECT_EQ(some.value, "matrices of order 5 for 1 of 2 parts");
+  EXPECT_NE(some.reason.find("'m2'"), std::string::npos);
+  EXPECT_TRUE(some.warnings.empty());
+  const auto smooth = plan_glossy(scene_with({{1, 0.1F}}), PrtStep::Glossy::automatic, 3);
+  EXPECT_EQ(smooth.plan.order, 3);
+  ASSERT_EQ(smooth.warnings.size(), 1U);
+  EXPECT_EQ(smooth.warnings[0].code, "glossy_blurred");
+  EXPECT_FALSE(plan_glossy(scene_with({{1, 0.1F}}), PrtStep::Glossy::off, 6).plan);
+  EXPECT_TRUE(plan_glossy(scene_with({{1, 1}}), PrtStep::Glossy::on, 6).plan);
+}
+
+/// The hash of the recipe is part of the provenance: blanked, so that files of two recipes can be compared.
+std::string without_hash(const Bytes& file) {
+  std::string text(file.begin(), file.end());
+  const std::string key = "\"recipe_sha256\":\"";
+  const auto at = text.find(key);
+  EXPECT_NE(at, std::string::npos);
+  return text.replace(at + key.size(), 64, 64, '0');
+}
+
+TEST(GlossyBake, ASceneWithoutSpecularPartsHasTheSameBytesWhetherAskedAutoOrOff) {
+  Threads threads;
+  const auto automatic = bake(input_of("column", small()), {}, threads);
+  const auto off = bake(input_of("column", small(R"(,"glossy":"off")")), {}, threads);
+  const auto asked = bake(input_of("column", small(R"(,"glossy":"auto")")), {}, threads);
+  ASSERT_TRUE(automatic && off && asked);
+  EXPECT_EQ(file(*automatic, "scene.glb"), file(*asked, "scene.glb"));
+  EXPECT_EQ(without_hash(file(*automatic, "scene.glb")), without_hash(file(*off, "scene.glb")));
+  EXPECT_FALSE(report_of(*automatic).contains("glossy"));
+}
+
+TEST(GlossyBake, OldRecipesKeepTheirIdentity) {
+  const std::string plain = recipe_identity(*parse_recipe(small()));
+  EXPECT_EQ(plain.find("glossy"), std::string::npos);
+  EXPECT_EQ(recipe_identity(*parse_recipe(small(R"(,"glossy":"auto")"))), plain);
+  EXPECT_NE(recipe_identity(*parse_recipe(small(R"(,"glossy":"off")"))), plain);
+  EXPECT_NE(recipe_identity(*parse_recipe(small(R"(,"glossy":"on")"))), plain);
+}
+
+TEST(GlossyBake, MetalKnotIsCertifiedApartAndItsDiffuseLightIsTheSameAsWithout) {
+  Threads threads;
+  const auto glossy = bake(finished("column", small(), kMetalKnot), {}, threads);
+  const auto plain = bake(finished("column", small(R"(,"glossy":"off")"), kMetalKnot), {}, threads);
+  ASSERT_TRUE(glossy && plain);
+  const auto with = read_baked_glb(file(*glossy, "scene.glb")), without = read_baked_glb(file(*plain, "scene.glb"));
+  ASSERT_TRUE(with && without);
+  EXPECT_FALSE(without->glossy);
+  ASSERT_TRUE(with->glossy);
+  EXPECT_EQ(with->glossy.order, 4);  // that of the draft quality
+  for (const Triangle& t : with->scene.mesh.triangles) {
+    const bool knot = with->scene.parts[with->scene.mesh.part[&t - with->scene.mesh.triangles.data()]].name == "knot";
+    EXPECT_EQ(with->glossy.find(t[0]) != GlossyTransfer::kNoMatrix, knot);
+  }
+  const json report = report_of(*glossy);
+  EXPECT_EQ(report["certificate"]["relrmse"], report_of(*plain)["certificate"]["relrmse"]);
+  const json& g = report["glossy"];
+  std::printf("glossy: %s\n", g.dump().c_str());
+  EXPECT_GT(g["radiance"]["relrmse"].get<double>(), 0);
+  EXPECT_LT(g["radiance"]["relrmse"].get<double>(), 0.15);
+  EXPECT_LE(g["radiance"]["interval"][0].get<double>(), g["radiance"]["relrmse"].get<double>());
+  EXPECT_LT(g["compression"].get<double>(), 0.06);  // 4 % of the draft quality by half, and what samples do not know
+  EXPECT_TRUE(g["job_light"].contains("relrmse"));
+}
+
+TEST(GlossyBake, ThreadCountChangesNotOneByte) {
+  Threads one(1), three(3);
+  const auto a = bake(finished("room", small(), {{"white", {{"roughnessFactor", 0.3}}}}), {}, one);
+  const auto b = bake(finished("room", small(), {{"white", {{"roughnessFactor", 0.3}}}}), {}, three);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(file(*a, "scene.glb"), file(*b, "scene.glb"));
+  EXPECT_EQ(report_of(*a)["glossy"]["radiance"], report_of(*b)["glossy"]["radiance"]);
+  bool warned = false;
+  for (const json& w : report_of(*a)["warnings"]) warned = warned || w["code"] == "glossy_blurred";
+  EXPECT_TRUE(warned);
+}
+
+}  // namespace
+}  // namespace kiln
