@@ -23,24 +23,13 @@ constexpr std::size_t kMost = sh_count(kMaxShOrder);
 
 using Numbers = std::vector<float>;
 
-/// The harmonics that are even in z.
-std::vector<std::size_t> even_slots(int order) {
-  std::vector<std::size_t> out;
-  for (int l = 0; l < order; ++l) {
-    for (int m = -l; m <= l; ++m) {
-      if ((l + m) % 2 == 0) out.push_back(static_cast<std::size_t>(l * (l + 1) + m));
-    }
-  }
-  return out;
-}
-
-/// Directions uniform over the upper half space, with 2 e_o and Y_i of each.
+/// Directions uniform over the upper half space, with their harmonics.
 struct HalfSpace {
   std::vector<Vec3f> direction;
-  Numbers even, all;  // [ray * even or count]
+  Numbers harmonics;  // [ray * count + i]
 };
 
-HalfSpace half_space(int order, int samples, std::uint64_t seed, const std::vector<std::size_t>& even) {
+HalfSpace half_space(int order, int samples, std::uint64_t seed) {
   HalfSpace out;
   std::array<float, kMost> y;
   for (int k = 0; k < samples; ++k) {
@@ -50,16 +39,15 @@ HalfSpace half_space(int order, int samples, std::uint64_t seed, const std::vect
     const Vec3f w = to_float(Vec3d{disk.x * stretch, disk.y * stretch, 1 - r2});  // equal areas: z = 1 - r^2
     out.direction.push_back(w);
     evaluate_sh(order, w, y.data());
-    for (const std::size_t o : even) out.even.push_back(2 * y[o]);
-    out.all.insert(out.all.end(), y.begin(), y.begin() + sh_count(order));
+    out.harmonics.insert(out.harmonics.end(), y.begin(), y.begin() + sh_count(order));
   }
   return out;
 }
 
 /// Equation 1 where nothing is hit.
-Numbers open_matrix(int order, const std::vector<std::size_t>& even) {
+Numbers open_matrix(int order) {
   const auto count = static_cast<std::size_t>(sh_count(order));
-  std::vector<double> sum(even.size() * count, 0.0);
+  std::vector<double> sum(count * count, 0.0);
   std::array<double, kMost> y;
   const int azimuths = 2 * order + 2;
   for (const QuadratureNode& node : gauss_legendre(2 * order)) {
@@ -68,8 +56,8 @@ Numbers open_matrix(int order, const std::vector<std::size_t>& even) {
       const double phi = 2 * std::numbers::pi * (j + 0.5) / azimuths;
       const double weight = node.weight / 2 * 2 * std::numbers::pi / azimuths;
       evaluate_sh(order, Vec3d{r * std::cos(phi), r * std::sin(phi), z}, y.data());
-      for (std::size_t e = 0; e < even.size(); ++e) {
-        for (std::size_t i = 0; i < count; ++i) sum[e * count + i] += weight * 2 * y[even[e]] * y[i];
+      for (std::size_t o = 0; o < count; ++o) {
+        for (std::size_t i = 0; i < count; ++i) sum[o * count + i] += weight * y[o] * y[i];
       }
     }
   }
@@ -88,17 +76,16 @@ struct GlossyMatrixBaker::State {
         count_(static_cast<std::size_t>(sh_count(params.order))),
         inputs_(count_ + (params.fixed ? 1 : 0)),
         channels_(static_cast<std::size_t>(params.channels)),
-        even_(even_slots(params.order)),
-        open_(open_matrix(params.order, even_)),
+        open_(open_matrix(params.order)),
         faces_(scene_),
         support_(scene_.mesh.position) {
     for (std::uint64_t set = 0; set < kSets; ++set)
-      sets_.push_back(half_space(params.order, samples_, mix64(mix64(params.seed ^ 0x676c6f737379ULL) ^ set), even_));
+      sets_.push_back(half_space(params.order, samples_, mix64(mix64(params.seed ^ 0x676c6f737379ULL) ^ set)));
   }
 
   std::uint64_t bake(const TransferPoint& point, float* out) const {
-    Numbers sky(even_.size() * count_, 0.0F);                    // of the rays that hit
-    Numbers surfaces(channels_ * even_.size() * inputs_, 0.0F);  // world axes for i, the normal's for o
+    Numbers sky(count_ * count_, 0.0F);                    // of the rays that hit
+    Numbers surfaces(channels_ * count_ * inputs_, 0.0F);  // world axes for i, the normal's for o
     Random random(params_.seed, point_key(point));
     const HalfSpace& set = sets_[random.next() % kSets];
     const Basis<float> basis = turned(point.normal, 2 * std::numbers::pi_v<float> * random.uniform());
@@ -106,7 +93,7 @@ struct GlossyMatrixBaker::State {
     if (traced) trace(point, set, basis, sky, surfaces);
     const float weight = 2 * std::numbers::pi_v<float> / static_cast<float>(samples_);
     for (std::size_t k = 0; k < sky.size(); ++k) sky[k] = open_[k] - weight * sky[k];
-    for (std::size_t e = 0; e < even_.size(); ++e) rotate_sh(params_.order, basis, &sky[e * count_], &sky[e * count_]);
+    for (std::size_t o = 0; o < count_; ++o) rotate_sh(params_.order, basis, &sky[o * count_], &sky[o * count_]);
     write(basis, sky, surfaces, weight, out);
     return traced ? static_cast<std::uint64_t>(samples_) : 0;
   }
@@ -131,22 +118,22 @@ struct GlossyMatrixBaker::State {
       tracer_.closest16(rays, hits);
       for (std::size_t k = 0; k < kPacket; ++k) {
         if (hits.triangle[k] == kNoHit) continue;
-        const float* even = &set.even[(first + k) * even_.size()];
-        add(even, &set.all[(first + k) * count_], count_, sky.data());
-        add_surface({rays.dx[k], rays.dy[k], rays.dz[k]}, hits, k, even, surfaces.data());
+        const float* y = &set.harmonics[(first + k) * count_];
+        add(y, y, count_, sky.data());
+        add_surface({rays.dx[k], rays.dy[k], rays.dz[k]}, hits, k, y, surfaces.data());
       }
     }
   }
 
-  /// sum[e][i] += even[e] * row[i].
-  void add(const float* even, const float* row, std::size_t width, float* sum) const {
-    for (std::size_t e = 0; e < even_.size(); ++e, sum += width) {
-      for (std::size_t i = 0; i < width; ++i) sum[i] += even[e] * row[i];
+  /// sum[o][i] += y[o] * row[i].
+  void add(const float* y, const float* row, std::size_t width, float* sum) const {
+    for (std::size_t o = 0; o < count_; ++o, sum += width) {
+      for (std::size_t i = 0; i < width; ++i) sum[i] += y[o] * row[i];
     }
   }
 
   /// What the surface sends back along the ray, as rows over the inputs.
-  void add_surface(const Vec3f& direction, const Hits16& hits, std::size_t k, const float* even, float* sum) const {
+  void add_surface(const Vec3f& direction, const Hits16& hits, std::size_t k, const float* y, float* sum) const {
     const std::uint32_t t = hits.triangle[k];
     const HitSide side = faces_.side(t, direction);
     if (side == HitSide::dark || (!params_.reflected && !params_.fixed)) return;
@@ -156,7 +143,7 @@ struct GlossyMatrixBaker::State {
     const Vec3f albedo = reflects ? albedo_at(scene_, p) : Vec3f{};
     const std::array<float, 3> corner{1 - p.u - p.v, p.u, p.v};
     std::array<float, kMost + 1> row;
-    for (std::size_t c = 0; c < channels_; ++c, sum += even_.size() * inputs_) {
+    for (std::size_t c = 0; c < channels_; ++c, sum += count_ * inputs_) {
       row.fill(0);
       for (std::size_t j = 0; reflects && j < 3; ++j) {
         const float* from = light_.at(scene_.mesh.triangles[t][j], static_cast<int>(c));
@@ -165,7 +152,7 @@ struct GlossyMatrixBaker::State {
         if (params_.fixed) row[count_] += weight * from[light_.slots() - 1];
       }
       if (params_.fixed) row[count_] += emitted[c];
-      add(even, row.data(), inputs_, sum);
+      add(y, row.data(), inputs_, sum);
     }
   }
 
@@ -173,12 +160,10 @@ struct GlossyMatrixBaker::State {
   void write(const Basis<float>& basis, const Numbers& sky, const Numbers& surfaces, float weight, float* out) const {
     std::array<float, kMost> column;
     for (std::size_t c = 0; c < channels_; ++c, out += count_ * inputs_) {
-      const float* reflected = surfaces.data() + c * even_.size() * inputs_;
+      const float* reflected = surfaces.data() + c * count_ * inputs_;
       for (std::size_t i = 0; i < inputs_; ++i) {
-        column.fill(0);
-        for (std::size_t e = 0; e < even_.size(); ++e) {
-          column[even_[e]] = weight * reflected[e * inputs_ + i] + (i < count_ ? sky[e * count_ + i] : 0);
-        }
+        for (std::size_t o = 0; o < count_; ++o)
+          column[o] = weight * reflected[o * inputs_ + i] + (i < count_ ? sky[o * count_ + i] : 0);
         rotate_sh(params_.order, basis, column.data(), column.data());
         for (std::size_t o = 0; o < count_; ++o) out[o * inputs_ + i] = column[o];
       }
@@ -191,8 +176,7 @@ struct GlossyMatrixBaker::State {
   const GlossyMatrix params_;
   const int samples_;
   const std::size_t count_, inputs_, channels_;
-  const std::vector<std::size_t> even_;
-  const Numbers open_;  // [even][i]
+  const Numbers open_;  // [o][i]
   const GatherFaces faces_;
   const SupportTree support_;
   std::vector<HalfSpace> sets_;

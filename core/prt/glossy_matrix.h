@@ -1,15 +1,13 @@
 #pragma once
 // One transfer matrix (glossy_transfer.h), from closest-hit rays over the half space of a point's normal.
-//   M[o][i] = 2 integral over the half space of e_o(w) (V(w) Y_i(w) + (1 - V(w)) rho(y) T_i(y)) dw,  y = hit along w
-//   (1)
-// in the frame of the normal, where e_o = Y_o of the harmonics that are even in z (l + m even), and 0 of the others:
-// the coefficients of light continued by its mirror image. T(y) is the diffuse transfer vector of the surface that is
-// hit; the lamps' column takes what y emits and its lamp light. Turned into world axes at the end. Rays    in sets that
-// all points share (uniform over the half space, stratified), azimuth by hash. The open part is the
-//         closed form minus the rays that hit; a point that nothing rises above takes no ray.
+//   M[o][i] = integral over the half space of Y_o(w) (V(w) Y_i(w) + (1 - V(w)) rho(y) T_i(y)) dw,
+//   y = hit along w                                                                                               (1)
+// T(y) is the diffuse transfer vector of the surface that is hit; the lamps' column takes what y emits and its lamp
+// light. Summed in the frame of the normal and turned into world axes at the end.
+// Rays    in sets that all points share (uniform over the half space, stratified), azimuth by hash. The open part is
+//         the closed form minus the rays that hit; a point that nothing rises above takes no ray.
 // Repeat  same bits for any thread count: a matrix is a function of the point.
 // Left out  light from the backs of double-sided faces counts as dark: no vertex holds it.
-// Cost    20 us and rays x .1 us for a point, order 5 (tests/bench has no row of it yet)
 
 #include <cstdint>
 #include <memory>

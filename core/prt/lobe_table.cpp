@@ -142,11 +142,12 @@ Vec3d reflected_light(const Lobe& lobe, const Vec3d& normal, const Vec3d& view, 
   const Vec3d away = normalized(normal * dot(normal, view) - view, basis_around(normal).x);
   const Axes axes = axes_around(normal, away);
   std::array<double, sh_count(kMaxLobeOrder)> y;
-  Vec3d out = light[0] * 0.28209479177387814;  // Y(0,0)
-  for (std::size_t j = 0; j < 3; ++j) {
-    evaluate_sh(lobe.order, axes[j], y.data());
+  Vec3d out = light[0] * (2 * 0.28209479177387814);  // Y(0,0)
+  for (std::size_t j = 0; j < 6; ++j) {
+    const Vec3d& axis = axes[j % 3];
+    evaluate_sh(lobe.order, j < 3 ? axis : axis - normal * (2 * dot(axis, normal)), y.data());
     for (int l = 1; l < lobe.order; ++l) {
-      const double gain = lobe.gain[static_cast<std::size_t>(l)][j];
+      const double gain = lobe.gain[static_cast<std::size_t>(l)][j % 3];
       for (auto i = static_cast<std::size_t>(l * l); i < static_cast<std::size_t>((l + 1) * (l + 1)); ++i)
         out += light[i] * (gain * y[i]);
     }

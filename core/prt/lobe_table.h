@@ -1,10 +1,12 @@
 #pragma once
 // What a rough surface reflects of the light around, band by band. Towards the eye in direction v, over a normal n,
-// under light that arrives with coefficients L and is its own mirror image about the surface (glossy_transfer.h):
-//   specular = (F0 a + b) (L_00 Y_00 + sum_{l > 0} sum_j g_lj sum_m L_lm Y_lm(axis_j))                            (1)
+// under light that arrives from the half space of n with coefficients L (glossy_transfer.h), continued below it by its
+// mirror image:
+//   specular = (F0 a + b) (2 L_00 Y_00 + sum_{l > 0} sum_j g_lj sum_m L_lm (Y_lm(axis_j) + Y_lm(image_j)))        (1)
 //   axis_0 = n,  axis_1 = (n + t) / sqrt(2),  axis_2 = t,  t = the direction along the surface away from the eye
+//   image_j = axis_j mirrored about the surface: -n, (t - n) / sqrt(2), t
 // F0 a + b is the integral of f(v, l) n.l dl. The g_lj make (1) the mean of the light over the lobe, l in proportion to
-// f n.l without its Fresnel term: what is even in both mirror planes of a lobe has l / 2 + 1 numbers in band l, which
+// f n.l without its Fresnel term: what is even about surface and plane of view has l / 2 + 1 numbers in band l, which
 // symmetric functions about three axes span up to band 4. A mirror is such a lobe too.
 // Paper   Kautz, Sloan and Snyder 2002 (SH light reflected by any isotropic BRDF, tabled by view); Karis 2013 (the
 //         split sum: a, b).   Differs  their lobes symmetric about the mirror direction miss by .3 at roughness .5.

@@ -8,6 +8,7 @@
 #include "core/prt/glossy_bake.h"
 #include "core/prt/glossy_matrix.h"
 #include "core/prt/interreflection.h"
+#include "core/prt/lobe_table.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/sh.h"
 #include "tests/core/prt/test_scenes.h"
@@ -48,15 +49,14 @@ std::vector<double> times(const std::vector<float>& matrix, const std::vector<do
   return out;
 }
 
-/// Coefficients of arriving(w) over the half space of n, continued by its mirror image: quadrature by many directions.
+/// Coefficients of arriving(w) over the half space of n: quadrature by many directions.
 template <class F>
 std::vector<double> project_half_space(const Vec3d& n, int degree, const F& arriving) {
   std::vector<double> out(kCount);
   std::array<double, kCount> y;
   for (const SphereNode& node : sphere_quadrature(degree)) {
     const double height = dot(node.direction, n);
-    const Vec3d above = height < 0 ? node.direction - n * (2 * height) : node.direction;
-    const double radiance = arriving(above);
+    const double radiance = height > 0 ? arriving(node.direction) : 0;
     evaluate_sh(kOrder, node.direction, y.data());
     for (std::size_t i = 0; i < kCount; ++i) out[i] += node.weight * radiance * y[i];
   }
@@ -89,7 +89,7 @@ Scene floor_scene(const Vec3f& across, const Vec3f& up) {
   return scene;
 }
 
-TEST(GlossyMatrix, OpenPointSeesTheLightOfItsHalfSpaceAndItsMirrorImage) {
+TEST(GlossyMatrix, OpenPointSeesTheLightOfItsHalfSpace) {
   Random random(3, 1);
   for (int trial = 0; trial < 5; ++trial) {
     const Vec3f n = normalized(Vec3f{random.uniform() - 0.5F, random.uniform() - 0.5F, random.uniform() - 0.5F});
@@ -98,19 +98,28 @@ TEST(GlossyMatrix, OpenPointSeesTheLightOfItsHalfSpaceAndItsMirrorImage) {
     const auto matrix =
         matrix_of(scene, black_transfer(scene), point_at({0, 0, 0}, n), {.order = kOrder, .channels = 1});
     const std::vector<double> light = random_light(11 + static_cast<std::uint64_t>(trial));
-    // The mirror image has an edge at the horizon, where quadrature by 2000 points a side leaves 1e-3.
+    // Light ends at the horizon, where quadrature by 1600 points around leaves 1e-3.
     const auto truth = project_half_space(to_double(n), 1600, [&](const Vec3d& w) { return light_along(light, w); });
     EXPECT_LT(distance(times(matrix, light), truth), 2e-3 * size(truth));
   }
 }
 
-TEST(GlossyMatrix, ConstantSkyArrivesConstantWhereNothingStands) {
+TEST(GlossyMatrix, AConstantSkyOverAnOpenPointIsMirroredAsItIs) {
   const Scene scene = floor_scene({0.5F, 0, 0}, {0, 0.5F, 0});
   const auto matrix =
       matrix_of(scene, black_transfer(scene), point_at({0, 0, 0}, {0, 0, 1}), {.order = kOrder, .channels = 1});
   std::vector<double> light(kCount);
   light[0] = 2 * std::sqrt(std::numbers::pi);
-  EXPECT_LT(distance(times(matrix, light), light), 1e-5);  // float rounding of the closed form
+  std::vector<Vec3d> arriving;
+  for (const double x : times(matrix, light)) arriving.push_back({x, x, x});
+  const LobeTable table = make_lobe_table(kOrder);
+  for (const double nv : {0.1, 0.5, 0.9}) {
+    const Vec3d v{0, std::sqrt(1 - nv * nv), nv};
+    for (const double roughness : {0.0, 0.5, 1.0}) {
+      const Vec3d shown = reflected_light(lobe_at(table, nv, roughness), {0, 0, 1}, v, arriving.data());
+      EXPECT_NEAR(shown.x, 1, 1e-5) << nv << ' ' << roughness;  // float rounding of the closed form
+    }
+  }
 }
 
 /// A floor in z = 0 and a wall in the plane x = d, nearly infinite.
@@ -138,8 +147,8 @@ TEST(GlossyMatrix, BlackWallTakesAwayHalfTheSky) {
     const auto light = random_light(seed);
     const auto truth = project_half_space(
         {0, 0, 1}, 1600, [&](const Vec3d& w) { return hits_wall(kD, w) ? 0.0 : light_along(light, w); });
-    // 16384 stratified rays at one straight edge: about N^-3/4 = 7e-4; the quadrature's own edge 1e-3.
-    EXPECT_LT(distance(times(matrix, light), truth), 4e-3 * size(truth)) << seed;
+    // 16384 stratified rays at one straight edge: about N^-3/4 = 7e-4; the quadrature at horizon and edge: a few 1e-3.
+    EXPECT_LT(distance(times(matrix, light), truth), 8e-3 * size(truth)) << seed;
   }
 }
 
@@ -161,7 +170,7 @@ TEST(GlossyMatrix, WallSendsBackItsDiffuseLightInItsColour) {
         {0, 0, 1}, 1600, [&](const Vec3d& w) { return hits_wall(kD, w) ? albedo[c] : light_along(only_two, w); });
     const std::vector<float> part(matrix.begin() + static_cast<std::ptrdiff_t>(c * kCount * kCount),
                                   matrix.begin() + static_cast<std::ptrdiff_t>((c + 1) * kCount * kCount));
-    EXPECT_LT(distance(times(part, only_two), truth), 4e-3 * size(truth)) << c;  // as above
+    EXPECT_LT(distance(times(part, only_two), truth), 8e-3 * size(truth)) << c;  // as above
   }
 }
 
@@ -181,7 +190,7 @@ TEST(GlossyMatrix, LampsColumnHoldsWhatLampsEmitAndWhatTheyLight) {
         project_half_space({0, 0, 1}, 1600, [&](const Vec3d& w) { return hits_wall(kD, w) ? radiance[c] : 0.0; });
     std::vector<double> column(kCount);
     for (std::size_t o = 0; o < kCount; ++o) column[o] = matrix[(c * kCount + o) * (kCount + 1) + kCount];
-    EXPECT_LT(distance(column, truth), 5e-3 * size(truth)) << c;  // as above
+    EXPECT_LT(distance(column, truth), 8e-3 * size(truth)) << c;  // as above
   }
 }
 
@@ -233,9 +242,10 @@ TEST(GlossyMatrix, NoLightIsMadeUnderAConstantSky) {
   std::vector<float> matrix(baker.stride());
   for (const TransferPoint& p : points) {
     baker.bake(p, matrix.data());
-    // The mean of the arriving light: all of it is sky of radiance 1 or surfaces of albedo below 1 lit by no more.
+    // The mean of the arriving light over all directions, half of them dark: all of it is sky of radiance 1 or surfaces
+    // of albedo below 1 lit by no more.
     EXPECT_GE(matrix[0], -1e-4);
-    EXPECT_LE(matrix[0], 1 + 1e-4);
+    EXPECT_LE(matrix[0], 0.5 + 1e-4);
   }
 }
 
