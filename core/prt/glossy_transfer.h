@@ -3,10 +3,10 @@
 //   L[c][o](v) = sum_i M[c][o][i](v) light_i[c]  (+ M[c][o][order^2] where `fixed`: light of the scene's own lamps) (1)
 //   M(v) = mean + sum_k w_k(v) row_k                                                                              (2)
 // L are SH coefficients, in world axes, of the radiance that arrives at v from the half space of its normal: from the
-// sky where it is seen, and from the diffuse surfaces that hide it. Nothing arrives from below; who reflects the light
-// adds its mirror image about the surface (lobe_table.h), which takes away the edge there that `order` bands cannot
-// hold. (Matrices of the mirrored light itself hang on the normal in a way that hundreds of components do not catch;
-// the sky's part of these ones is a product with visibility, of (2 order - 1)^2 dimensions at most.)
+// sky where it is seen, and from the diffuse surfaces that hide it. Nothing arrives from below. (The sky's part is a
+// product with visibility: all matrices of a scene lie in (2 order - 1)^2 dimensions, and few components hold them.
+// Matrices of light that is continued below the surface, as it is reflected in lobe_table.h, hang on the normal in a
+// way that hundreds do not catch.)
 // Paper   Kautz, Sloan and Snyder 2002; Lehtinen et al. 2007, section 6.4 (25 terms)
 // Shape   row[(c * order^2 + o) * inputs() + i]; weights[n * rank + k] of the n-th of `vertices`
 // Units   as Transfer: light and L are radiance.

@@ -1,18 +1,23 @@
 #include "core/prt/lobe_table.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "core/base/expects.h"
+#include "core/sphere/quadrature.h"
 #include "core/sphere/sh.h"
 #include "core/trace/ggx.h"
 
 namespace kiln {
 namespace {
 
-constexpr int kGrid = 64;          // samples of the lobe a side
+constexpr int kGrid = 64;                     // samples of the lobe a side
+constexpr double kY00 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
+constexpr double kRidge = 0.01;    // G's smallest eigenvalues are 1e-5: below this storage would be heard, not light
 constexpr double kGrazing = 1e-3;  // the least n.v that is looked at
 
 struct Drawn {
@@ -45,45 +50,66 @@ std::vector<double> moments_of(const std::vector<Drawn>& lobe, int order) {
   return out;
 }
 
-using Axes = std::array<Vec3d, 3>;
+using Axes = std::array<Vec3d, kLobeAxes>;
 
 Axes axes_around(const Vec3d& normal, const Vec3d& away) {
-  return {normal, (normal + away) * std::numbers::sqrt2 / 2.0, away};
-}
-
-/// The axes that band l needs, one for each m = l, l - 2, .. >= 0: odd bands are 0 along the normal.
-std::vector<std::size_t> axes_of_band(int l) {
-  if (l == 1) return {2};
-  if (l == 2) return {0, 2};
-  return l == 3 ? std::vector<std::size_t>{1, 2} : std::vector<std::size_t>{0, 1, 2};
-}
-
-/// Solves sum_j g_j Y_lm(axis_j) = moment_lm for m = l, l - 2, .. >= 0 by elimination; at most three equations, whose
-/// determinants are far from 0.
-void solve_band(int l, const std::vector<double>& moments, float* gain) {
-  const std::vector<std::size_t> used = axes_of_band(l);
-  const std::size_t n = used.size();
-  const Axes axes = axes_around({0, 0, 1}, {1, 0, 0});
-  std::array<std::array<double, 4>, 3> rows{};
-  std::array<double, sh_count(kMaxLobeOrder)> y;
-  for (std::size_t j = 0; j < n; ++j) {
-    evaluate_sh(l + 1, axes[used[j]], y.data());
-    for (std::size_t r = 0; r < n; ++r) rows[r][j] = y[static_cast<std::size_t>(l * (l + 1) + l) - 2 * r];
+  Axes out;
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(j) / kLobeAxes;
+    out[j] = normal * std::cos(angle) + away * std::sin(angle);
   }
-  for (std::size_t r = 0; r < n; ++r) rows[r][3] = moments[static_cast<std::size_t>(l * (l + 1) + l) - 2 * r];
-  for (std::size_t pivot = 0; pivot < n; ++pivot) {
-    for (std::size_t r = pivot + 1; r < n; ++r) {
-      if (std::abs(rows[r][pivot]) > std::abs(rows[pivot][pivot])) std::swap(rows[r], rows[pivot]);
-    }
-    for (std::size_t r = 0; r < n; ++r) {
-      const double share = rows[r][pivot] / rows[pivot][pivot];
-      for (std::size_t k = pivot; r != pivot && k < 4; ++k) rows[r][k] -= share * rows[pivot][k];
-    }
-  }
-  for (std::size_t j = 0; j < n; ++j) gain[used[j]] = static_cast<float>(rows[j][3] / rows[j][j]);
+  return out;
 }
 
-void fill_entry(int order, double alpha, double angle, float* out) {
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// What does not change from entry to entry. Harmonics even about y = 0 only: m = 0 .. l of each band.
+struct Fit {
+  explicit Fit(int bands) : order(bands) {
+    for (int l = 0; l < order; ++l) {
+      for (int m = 0; m <= l; ++m) slots.push_back(static_cast<std::size_t>(l * (l + 1) + m));
+    }
+    const auto count = static_cast<Eigen::Index>(slots.size());
+    above = MatrixXd::Zero(count, count);
+    std::array<double, sh_count(kMaxLobeOrder)> y;
+    for (const QuadratureNode& node : gauss_legendre(2 * order)) {
+      const double z = (node.x + 1) / 2, r = std::sqrt(1 - z * z);
+      const int azimuths = 2 * order + 2;
+      for (int k = 0; k < azimuths; ++k) {
+        const double phi = 2 * std::numbers::pi * (k + 0.5) / azimuths;
+        evaluate_sh(order, Vec3d{r * std::cos(phi), r * std::sin(phi), z}, y.data());
+        VectorXd even(count);
+        for (Eigen::Index i = 0; i < count; ++i) even[i] = y[slots[static_cast<std::size_t>(i)]];
+        above += even * even.transpose() * (node.weight / 2 * 2 * std::numbers::pi / azimuths);
+      }
+    }
+    const Axes axes = axes_around({0, 0, 1}, {1, 0, 0});
+    for (int l = 0; l < order; ++l) {
+      along.emplace_back(l + 1, kLobeAxes);
+      for (std::size_t j = 0; j < axes.size(); ++j) {
+        evaluate_sh(l + 1, axes[j], y.data());
+        for (int m = 0; m <= l; ++m)
+          along.back()(m, static_cast<Eigen::Index>(j)) = y[static_cast<std::size_t>(l * (l + 1) + m)];
+      }
+    }
+  }
+
+  int order;
+  std::vector<std::size_t> slots;
+  MatrixXd above;               // G
+  std::vector<MatrixXd> along;  // of band l: Y_lm of each axis
+};
+
+/// (G + ridge)^-1 q, scaled so that a constant light of 1 over an open point is seen as 1.
+VectorXd fitted(const Fit& fit, const std::vector<double>& moments) {
+  VectorXd q(fit.above.rows());
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = moments[fit.slots[static_cast<std::size_t>(i)]];
+  const VectorXd out = (fit.above + MatrixXd::Identity(q.size(), q.size()) * kRidge).ldlt().solve(q);
+  return out / (out.dot(fit.above.col(0)) * 2 * std::sqrt(std::numbers::pi));
+}
+
+void fill_entry(const Fit& fit, double alpha, double angle, float* out) {
   const double nv = std::max(kGrazing, std::cos(angle));
   const std::vector<Drawn> lobe = draw_lobe(alpha, {-std::sqrt(1 - nv * nv), 0, nv});  // leans to +x
   double a = 0, b = 0;
@@ -91,10 +117,16 @@ void fill_entry(int order, double alpha, double angle, float* out) {
     a += d.weight * (1 - d.fresnel) / (kGrid * kGrid);
     b += d.weight * d.fresnel / (kGrid * kGrid);
   }
+  const VectorXd weight = fitted(fit, moments_of(lobe, fit.order));
   out[0] = static_cast<float>(a);
   out[1] = static_cast<float>(b);
-  const std::vector<double> moments = moments_of(lobe, order);
-  for (int l = 1; l < order; ++l) solve_band(l, moments, out + 2 + 3 * (l - 1));
+  out[2] = static_cast<float>(weight[0] / kY00);
+  Eigen::Index first = 1;
+  for (int l = 1; l < fit.order; first += ++l) {
+    const MatrixXd& y = fit.along[static_cast<std::size_t>(l)];
+    const VectorXd gain = y.transpose() * (y * y.transpose()).ldlt().solve(weight.segment(first, l + 1));
+    for (Eigen::Index j = 0; j < kLobeAxes; ++j) out[3 + kLobeAxes * (l - 1) + j] = static_cast<float>(gain[j]);
+  }
 }
 
 /// A place between two entries.
@@ -114,11 +146,12 @@ Between between(double x, int size) {
 LobeTable make_lobe_table(int order) {
   EXPECTS(order >= 1 && order <= kMaxLobeOrder);
   LobeTable out{order, std::vector<float>(LobeTable::size_of(order), 0.0F)};
+  const Fit fit(order);
   float* entry = out.numbers.data();
   for (int row = 0; row < kLobeRows; ++row) {
     const double alpha = ggx_alpha(static_cast<double>(row) / (kLobeRows - 1));
     for (int column = 0; column < kLobeViews; ++column, entry += out.width())
-      fill_entry(order, alpha, std::numbers::pi / 2 * column / (kLobeViews - 1), entry);
+      fill_entry(fit, alpha, std::numbers::pi / 2 * column / (kLobeViews - 1), entry);
   }
   return out;
 }
@@ -133,8 +166,8 @@ Lobe lobe_at(const LobeTable& table, double nv, double roughness) {
     const double high = at[kLobeViews * width] * (1 - column.share) + at[(kLobeViews + 1) * width] * column.share;
     return low * (1 - row.share) + high * row.share;
   };
-  Lobe out{table.order, number(0), number(1)};
-  for (std::size_t k = 2; k < width; ++k) out.gain[1 + (k - 2) / 3][(k - 2) % 3] = number(k);
+  Lobe out{table.order, number(0), number(1), number(2), {}};
+  for (std::size_t k = 3; k < width; ++k) out.gain[1 + (k - 3) / kLobeAxes][(k - 3) % kLobeAxes] = number(k);
   return out;
 }
 
@@ -142,12 +175,11 @@ Vec3d reflected_light(const Lobe& lobe, const Vec3d& normal, const Vec3d& view, 
   const Vec3d away = normalized(normal * dot(normal, view) - view, basis_around(normal).x);
   const Axes axes = axes_around(normal, away);
   std::array<double, sh_count(kMaxLobeOrder)> y;
-  Vec3d out = light[0] * (2 * 0.28209479177387814);  // Y(0,0)
-  for (std::size_t j = 0; j < 6; ++j) {
-    const Vec3d& axis = axes[j % 3];
-    evaluate_sh(lobe.order, j < 3 ? axis : axis - normal * (2 * dot(axis, normal)), y.data());
+  Vec3d out = light[0] * (lobe.constant * kY00);
+  for (std::size_t j = 0; j < axes.size(); ++j) {
+    evaluate_sh(lobe.order, axes[j], y.data());
     for (int l = 1; l < lobe.order; ++l) {
-      const double gain = lobe.gain[static_cast<std::size_t>(l)][j % 3];
+      const double gain = lobe.gain[static_cast<std::size_t>(l)][j];
       for (auto i = static_cast<std::size_t>(l * l); i < static_cast<std::size_t>((l + 1) * (l + 1)); ++i)
         out += light[i] * (gain * y[i]);
     }

@@ -1,19 +1,21 @@
 #pragma once
 // What a rough surface reflects of the light around, band by band. Towards the eye in direction v, over a normal n,
-// under light that arrives from the half space of n with coefficients L (glossy_transfer.h), continued below it by its
-// mirror image:
-//   specular = (F0 a + b) (2 L_00 Y_00 + sum_{l > 0} sum_j g_lj sum_m L_lm (Y_lm(axis_j) + Y_lm(image_j)))        (1)
-//   axis_0 = n,  axis_1 = (n + t) / sqrt(2),  axis_2 = t,  t = the direction along the surface away from the eye
-//   image_j = axis_j mirrored about the surface: -n, (t - n) / sqrt(2), t
-// F0 a + b is the integral of f(v, l) n.l dl. The g_lj make (1) the mean of the light over the lobe, l in proportion to
-// f n.l without its Fresnel term: what is even about surface and plane of view has l / 2 + 1 numbers in band l, which
-// symmetric functions about three axes span up to band 4. A mirror is such a lobe too.
-// Paper   Kautz, Sloan and Snyder 2002 (SH light reflected by any isotropic BRDF, tabled by view); Karis 2013 (the
-//         split sum: a, b).   Differs  their lobes symmetric about the mirror direction miss by .3 at roughness .5.
+// under light that arrives from the half space of n with coefficients L (glossy_transfer.h):
+//   specular = (F0 a + b) (g_0 L_00 Y_00 + sum_{l > 0} sum_j g_lj sum_m L_lm Y_lm(axis_j))                        (1)
+//   axis_j = n cos(72 j) + t sin(72 j) degrees, j = 0 .. 4,   t = the direction along the surface away from the eye
+// F0 a + b is the integral of f(v, l) n.l dl. The sums are the mean over the lobe (l in proportion to f n.l without its
+// Fresnel term) of the series that fits the light best above the surface:
+//   mean = q . c,   q_i = mean of Y_i over the lobe,   (G + ridge) c = L,   G_ik = integral over the half space Y_i Y_k
+// L alone, as a series, would be dark below the surface and have an edge there that few bands cannot hold; c is free
+// below. What is even about the plane of view has l + 1 numbers in band l, which five axes in that plane span to
+// band 4. Paper   Kautz, Sloan and Snyder 2002 (SH light reflected by any isotropic BRDF, tabled by view); Karis 2013
+// (the
+//         split sum: a, b).   Differs  the fit above the surface; no lobe symmetric about the mirror direction, which
+//         misses by .3 at roughness .5.
 // Shape   numbers[(row * kLobeViews + column) * width + k]; roughness = row / (kLobeRows - 1), angle of v and n =
-//         pi/2 column / (kLobeViews - 1); k = 0, 1 are a, b, and 2 + 3 (l - 1) + j is g_lj. Bilinear.
-// Error   between rows and columns .01 of a and b (.03 within 6 degrees of grazing), .005 of the mean of light that
-//         spreads by half of itself (measured by the tests); and what the split sum neglects
+//         pi/2 column / (kLobeViews - 1); k = 0, 1, 2 are a, b, g_0, and 3 + 5 (l - 1) + j is g_lj. Bilinear.
+// Error   between rows and columns .01 of a and b (.03 within 6 degrees of grazing); exact under constant light over an
+//         open point; else see the tests. The split sum neglects that Fresnel's rise favours grazing light.
 // Cost    2 million drawn directions, once: .2 s
 
 #include <array>
@@ -24,14 +26,14 @@
 namespace kiln {
 
 inline constexpr int kLobeRows = 16, kLobeViews = 32;
-inline constexpr int kMaxLobeOrder = 5;
+inline constexpr int kLobeAxes = 5, kMaxLobeOrder = 5;
 
 struct LobeTable {
   int order = 0;  // 1 .. kMaxLobeOrder
   std::vector<float> numbers;
 
   int width() const { return width_of(order); }
-  static constexpr int width_of(int order) { return 2 + 3 * (order - 1); }
+  static constexpr int width_of(int order) { return 3 + kLobeAxes * (order - 1); }
   static constexpr std::size_t size_of(int order) {
     return static_cast<std::size_t>(kLobeRows) * kLobeViews * static_cast<std::size_t>(width_of(order));
   }
@@ -43,7 +45,8 @@ LobeTable make_lobe_table(int order);
 struct Lobe {
   int order = 1;
   double a = 1, b = 0;
-  std::array<std::array<double, 3>, kMaxLobeOrder> gain{};  // g_lj
+  double constant = 2;                                              // g_0
+  std::array<std::array<double, kLobeAxes>, kMaxLobeOrder> gain{};  // g_lj
 
   /// Directional albedo for reflectance F0 at normal incidence.
   Vec3d albedo(const Vec3d& f0) const { return f0 * a + Vec3d{b, b, b}; }

