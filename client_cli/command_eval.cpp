@@ -19,7 +19,7 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   Threads threads;
   const StopTogether together(session.interrupt, threads);
   const Places places = place_points(baked.scene, points, threads);
-  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo}), false};
+  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo, points}), false};
   return write_values(table, baked.scene.frame.scale, options.output, session);
 }
 

@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "core/artifact/evaluate.h"
+#include "core/artifact/eye.h"
+#include "core/bake/eye_material.h"
 #include "core/bake/surface_samples.h"
 #include "core/base/expects.h"
 #include "core/base/random.h"
@@ -112,6 +114,7 @@ Places place_points(const Scene& scene, std::span<const QueryPoint> points, Thre
 std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& places, std::span<const Vec3f> light,
                                         const LookupOptions& options) {
   std::vector<LightValue> out;
+  const EyeLight seen = eye_light(baked, {light.begin(), light.end()}, true);
   for (const auto& place : places) {
     if (!place) {
       out.push_back(no_value());
@@ -121,6 +124,14 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
                               static_cast<float>(place->v)};
     const Vec3d value = to_double(value_at(baked.transfer, point, light));
     out.push_back(light_value(baked.scene, *place, value, {}, options.scene_albedo));
+    const std::size_t index = out.size() - 1;
+    if (!options.scene_albedo || index >= options.points.size() || !options.points[index].view) continue;
+    const SurfacePoint surface = surface_at(baked.scene, *place);
+    const EyeRadiance radiance =
+        eye_radiance(baked, seen,
+                     {point, match_normal(baked.scene.mesh, *place), normalized(*options.points[index].view),
+                      eye_material(baked.scene, surface)});
+    out.back().radiance = radiance.diffuse + radiance.specular + to_double(emission_at(baked.scene, surface));
   }
   return out;
 }

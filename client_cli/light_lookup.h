@@ -21,9 +21,11 @@ using Places = std::vector<std::optional<SurfaceMatch>>;
 
 Places place_points(const Scene&, std::span<const QueryPoint>, Threads&);
 
-/// irradiance = pi * value; radiance = value, or albedo * value + emission where `scene_albedo`.
+/// irradiance = pi * value; radiance = value, or albedo * value + emission where `scene_albedo`, which towards a
+/// point's own eye (`points`, where it has one) is what core/artifact/eye.h says, and emission.
 struct LookupOptions {
   bool scene_albedo = false;
+  std::span<const QueryPoint> points = {};  // none, or one for each place
 };
 
 /// Values under the distant light `light` (SH of the artefact's order, or empty) and the scene's own lamps.

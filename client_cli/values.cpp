@@ -38,9 +38,20 @@ Vec3d three_of(const std::vector<double>& row, const std::array<std::size_t, 3>&
 Outcome<std::vector<QueryPoint>> points_of(const CsvTable& table, const std::string& path) {
   KILN_TRY(position, find_three(table, {"x", "y", "z"}, path));
   KILN_TRY(normal, find_three(table, {"nx", "ny", "nz"}, path));
+  std::array<std::size_t, 3> view{};
+  const bool has_view = table.find("vx") || table.find("vy") || table.find("vz");
+  if (has_view) {
+    KILN_TRY(found, find_three(table, {"vx", "vy", "vz"}, path));
+    view = found;
+  }
   std::vector<QueryPoint> points;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
-    points.push_back({three_of(table.rows[i], position), three_of(table.rows[i], normal)});
+    points.push_back({three_of(table.rows[i], position), three_of(table.rows[i], normal), std::nullopt});
+    if (has_view) points.back().view = three_of(table.rows[i], view);
+    if (has_view && !(is_finite(*points.back().view) && length(*points.back().view) > 0)) {
+      return fail(ExitCode::rejected, "not_finite", "the view direction must be finite and not zero",
+                  path + ": line " + std::to_string(table.lines[i]));
+    }
     if (is_finite(points.back().position) && is_finite(points.back().normal)) continue;
     return fail(ExitCode::rejected, "not_finite", "position and normal must be finite numbers",
                 path + ": line " + std::to_string(table.lines[i]));

@@ -7,6 +7,7 @@
 // irradiance is W m^-2; radiance W m^-2 sr^-1; distance is how far the point lay from the surface, in world units.
 // A point without a surface of compatible normal has nan in every value (null in JSON).
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@
 namespace kiln {
 
 struct QueryPoint {
-  Vec3d position, normal;  // world; the normal need not be unit
+  Vec3d position, normal;     // world; the normal need not be unit
+  std::optional<Vec3d> view;  // towards an eye, not zero: with --albedo scene eval gives the radiance that it sees
 };
 
 struct LightValue {

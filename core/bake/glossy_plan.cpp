@@ -12,9 +12,9 @@ namespace {
 constexpr std::size_t kTriangles = 1024;  // of a part that are looked at
 constexpr double kEnough = 0.01;          // of them
 
-std::string text(double x) {
+std::string text(float x) {
   char out[32];
-  std::snprintf(out, sizeof out, "%.2g", x);
+  std::snprintf(out, sizeof out, "%.2g", double{x});
   return out;
 }
 
@@ -29,7 +29,7 @@ PartFinish finish_of(const Scene& scene, const std::vector<std::uint32_t>& trian
     const SurfaceFinish finish = finish_at(scene, surface_point(scene, triangles[i], 1.0F / 3, 1.0F / 3));
     if (!all && !looks_specular(finish)) continue;
     ++specular;
-    out.smoothest = std::min(out.smoothest, double{finish.roughness});
+    out.smoothest = std::min(out.smoothest, finish.roughness);
   }
   out.specular = specular > 0 && static_cast<double>(specular) >= kEnough * static_cast<double>(seen);
   if (!out.specular) out.smoothest = 1;
@@ -50,7 +50,7 @@ std::string names_of(const Scene& scene, const std::vector<PartFinish>& finish) 
   return names[0] + (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "");
 }
 
-Warning too_sharp(int order, double smoothest, const std::string& names) {
+Warning too_sharp(int order, float smoothest, const std::string& names) {
   return {"glossy_blurred",
           "Reflections of " + names + " look blurred: at roughness " + text(smoothest) +
               " the lobe is sharper than the " + std::to_string(order) +
@@ -60,7 +60,7 @@ Warning too_sharp(int order, double smoothest, const std::string& names) {
 
 GlossyDecision decide(const Scene& scene, const std::vector<PartFinish>& finish, int order, std::string why) {
   GlossyDecision out;
-  double smoothest = 1;
+  float smoothest = 1;
   std::size_t count = 0;
   for (const PartFinish& f : finish) {
     out.plan.parts.push_back(f.specular);

@@ -15,12 +15,12 @@
 
 namespace kiln {
 
-inline constexpr double kGlossyMetal = 0.7, kGlossyOther = 0.4, kSharpest = 0.4;  // roughness
+inline constexpr float kGlossyMetal = 0.7F, kGlossyOther = 0.4F, kSharpest = 0.4F;  // roughness
 
 /// How a part reflects, over those of its triangles that count as specular.
 struct PartFinish {
   bool specular = false;
-  double smoothest = 1;  // roughness
+  float smoothest = 1;  // roughness
 };
 
 /// Of each part. `all`: whatever its roughness (unlit parts never).

@@ -73,12 +73,12 @@ void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
              " % of error");
 }
 
-/// Half the rays of a transfer vector: a matrix has no cosine that wastes them. Storage may add what it may add to the
-/// vectors, four times over: lobes blur the bands where most of it lies.
+/// As many rays as a transfer vector may take, all of them: a sharp lobe averages few. Storage may add what it may add
+/// to the vectors, four times over: lobes blur the bands where most of it lies.
 void plan_matrices(Plan& plan, const Scene& scene, const PrtStep& step) {
   GlossyDecision glossy = plan_glossy(scene, step.glossy, plan.order);
   plan.glossy = std::move(glossy.plan);
-  plan.glossy.samples = std::clamp(plan.samples / 2, 16, 1024);
+  plan.glossy.samples = std::clamp(plan.samples, 16, 4096);
   plan.glossy.compression = 4 * plan.compression;
   plan.warnings.insert(plan.warnings.end(), glossy.warnings.begin(), glossy.warnings.end());
   if (plan.glossy && !scene.lights.empty()) {
