@@ -59,7 +59,8 @@ Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
 /// accessor_count_mismatch, or as import_scene does.
 Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
 
-/// Decodes the images that base colour, emission and metallic-roughness textures name. One that cannot be decoded keeps empty pixels.
+/// Decodes the images that base colour, emission and metallic-roughness textures name. One that cannot be decoded keeps
+/// empty pixels.
 void decode_pixels(Scene&);
 
 }  // namespace kiln

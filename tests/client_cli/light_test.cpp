@@ -53,6 +53,18 @@ TEST_F(Light, PointsLieOnTheSurfaceEvenlyAndRepeat) {
   EXPECT_EQ(folder.read("p.csv"), first);
 }
 
+TEST_F(Light, AViewDirectionMustBeADirection) {
+  const std::string bad = folder.write("bad.csv", "0,0,0,0,1,0,0,0,0\n");
+  const auto points = read_points(bad);
+  ASSERT_FALSE(points);
+  const auto good = read_points(folder.write("good.csv", "0,0,0,0,1,0,1,2,0\n"));
+  ASSERT_TRUE(good && (*good)[0].view);
+  EXPECT_EQ((*good)[0].view->y, 2);
+  const auto none = read_points(folder.write("none.csv", "0,0,0,0,1,0\n"));
+  ASSERT_TRUE(none);
+  EXPECT_FALSE((*none)[0].view);
+}
+
 TEST_F(Light, APlaneUnderAConstantSkyOfOneReceivesPi) {
   const ValueTable truth =
       values({"reference", scene, "--points", draw(scene, 50), "--env", "1,1,1", "--samples", "64"});
