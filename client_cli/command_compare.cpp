@@ -35,6 +35,7 @@ Outcome<Side> load_side(const std::string& path) {
 /// The light under which artefacts are compared: --env, or what A was baked with.
 std::vector<Vec3f> common_light(const BakedScene& baked, const BakedScene& first,
                                 const std::optional<Environment>& environment) {
+  if (baked.transfer.order == 0) return {};  // radiosity has its own light
   if (environment) return project_environment(*environment, baked.transfer.order);
   std::vector<Vec3f> light = first.light.coefficients;  // bands are independent: fewer or more of them
   if (!light.empty()) light.resize(static_cast<std::size_t>(sh_count(baked.transfer.order)));

@@ -11,10 +11,16 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   KILN_TRY(points, read_points(options.points));
   KILN_TRY(baked, load_artefact(options.file));
   KILN_TRY(environment, load_light(options.light));
+  if (environment && baked.transfer.order == 0) {
+    return fail(ExitCode::usage, "not_relightable", "holds the light of one job (radiosity): leave out --env",
+                options.file);
+  }
   const std::vector<Vec3f> light =
       environment ? project_environment(*environment, baked.transfer.order) : baked.light.coefficients;
   if (!environment) {
-    say(light.empty() ? "the artefact's own lamps" : "the light it was baked with: " + baked.light.name);
+    say(baked.transfer.order == 0 ? "the light of its job (radiosity)"
+        : light.empty()           ? "the artefact's own lamps"
+                                  : "the light it was baked with: " + baked.light.name);
   }
   Threads threads;
   const StopTogether together(session.interrupt, threads);

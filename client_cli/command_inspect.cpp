@@ -148,8 +148,11 @@ std::string count(const json& facts, const char* name) { return facts[name].dump
 std::string light_lines(const json& light) {
   const std::string channels = light["channels"] == 1 ? "grey" : "RGB";
   std::string out =
-      line("transfer", "order " + light["order"].dump() + ": " + light["coefficients"].dump() + " coefficients, " +
-                           channels + (light["fixed"] == true ? ", and the light of the scene's own lamps" : ""));
+      light["order"] == 0
+          ? line("radiosity", channels + ", the light of one job, which cannot be turned")
+          : line("transfer", "order " + light["order"].dump() + ": " + light["coefficients"].dump() +
+                                 " coefficients, " + channels +
+                                 (light["fixed"] == true ? ", and the light of the scene's own lamps" : ""));
   const auto name = light["baked_light"].get<std::string>();
   out += line("baked light", name.empty() ? "none" : name);
   if (light["provenance"].is_object() && !light["provenance"].empty())

@@ -119,7 +119,7 @@ class PrimitiveBuilder {
 
   void add_coefficients(const StoredTransfer& transfer) {
     for (std::size_t k = 0; k < vec4s_of(transfer.form().count()); ++k) {
-      add({"_PRT_" + std::to_string(k), true, false},
+      add({transfer.name(k), true, false},
           {StreamKind::generic, 4, transfer.bits(k), {-1, -1, -1, -1}, 2, transfer.pack(k, vertices_)});
     }
   }
@@ -127,7 +127,7 @@ class PrimitiveBuilder {
   /// Of a part whose vertices have matrices.
   void add_matrices(const StoredGlossy& glossy) {
     for (std::size_t k = 0; glossy.has(vertices_[0]) && k < glossy.vec4s(); ++k) {
-      add({"_GLOSSY_" + std::to_string(k), true, false},
+      add({glossy_name(k), true, false},
           {StreamKind::generic, 4, glossy.bits(k), {-1, -1, -1, -1}, 2, glossy.pack(k, vertices_)});
     }
   }

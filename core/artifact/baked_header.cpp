@@ -52,9 +52,10 @@ void check_conventions(const Fields& extension, Findings& findings) {
 
 Transfer read_shape(const Fields& extension, Findings& findings) {
   Transfer out;
-  const std::uint64_t order = extension.count("order", 0), channels = extension.count("channels", 0);
-  if (order < 1 || order > kMaxShOrder) {
-    findings.fail("number_out_of_range", "The order must be 1 to 10.", extension.pointer("order"));
+  const std::uint64_t order = extension.count("order", kMaxShOrder + 1), channels = extension.count("channels", 0);
+  if (order > kMaxShOrder || (order == 0 && !extension.flag("fixed", false))) {
+    findings.fail("number_out_of_range", "The order must be 1 to 10, or 0 with fixed light.",
+                  extension.pointer("order"));
     return out;
   }
   if (channels != 1 && channels != 3) {
@@ -69,13 +70,13 @@ Transfer read_shape(const Fields& extension, Findings& findings) {
   return out;
 }
 
-void check_attribute_names(const Fields& extension, const std::string& prefix, std::size_t numbers,
-                           Findings& findings) {
+/// `name_of(k)` is that of VEC4 k.
+void check_attribute_names(const Fields& extension, const auto& name_of, std::size_t numbers, Findings& findings) {
   const std::vector<std::string> names = extension.texts("attributes");
   bool right = names.size() == vec4s_of(numbers);
-  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == prefix + std::to_string(k);
+  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == name_of(k);
   if (!right) {
-    findings.fail("slot_count_mismatch", "The attributes must be _PRT_0 and on, four numbers in each.",
+    findings.fail("slot_count_mismatch", "The attributes must be " + name_of(0) + " and on, four numbers in each.",
                   extension.pointer("attributes"));
   }
 }
@@ -97,7 +98,8 @@ void read_form(const json& root, const Fields& extension, BakedHeader& out, Find
     return;
   }
   const std::size_t count = out.form.expected_count(out.shape);
-  check_attribute_names(extension, "_PRT_", count, findings);
+  check_attribute_names(
+      extension, [&](std::size_t k) { return stored_name(out.shape, k); }, count, findings);
   const std::string scale = std::string(kPlace) + "/scale", offset = std::string(kPlace) + "/offset";
   out.form.scale = numbers(at(root, scale), scale, count, findings);
   out.form.offset = numbers(at(root, offset), offset, count, findings);
@@ -128,7 +130,7 @@ void read_glossy(const json& root, const Fields& extension, BakedHeader& out, Fi
   shape.components = {shape.stride(), std::vector<float>((rank + 1) * shape.stride())};
   out.glossy_view = components.index("bufferView", 1u << 30);
   out.lobes_view = lobes.index("bufferView", 1u << 30);
-  check_attribute_names(glossy, "_GLOSSY_", rank, findings);
+  check_attribute_names(glossy, glossy_name, rank, findings);
   const std::string place = std::string(kPlace) + "/glossy";
   out.glossy_form.scale = numbers(at(root, place + "/scale"), place + "/scale", rank, findings);
   out.glossy_form.offset = numbers(at(root, place + "/offset"), place + "/offset", rank, findings);

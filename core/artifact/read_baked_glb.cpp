@@ -142,7 +142,7 @@ void read_coefficients(const BakedFile& file, StreamReader& streams, std::size_t
   const std::size_t count = form.count();
   std::vector<float> numbers(vertices * count);
   for (std::size_t k = 0; k < vec4s_of(count); ++k) {
-    const std::vector<float> stored = streams.take("_PRT_" + std::to_string(k), 4);
+    const std::vector<float> stored = streams.take(stored_name(file.header.shape, k), 4);
     for (std::size_t j = 4 * k; j < std::min(4 * k + 4, count); ++j) {
       for (std::size_t v = 0; v < vertices; ++v)
         numbers[v * count + j] =
@@ -162,7 +162,7 @@ void read_matrices(const BakedFile& file, StreamReader& streams, std::size_t fir
   for (std::size_t v = 0; v < vertices; ++v) out.vertices.push_back(static_cast<std::uint32_t>(first + v));
   out.weights.resize(out.vertices.size() * rank);
   for (std::size_t k = 0; k < vec4s_of(rank); ++k) {
-    const std::vector<float> stored = streams.take("_GLOSSY_" + std::to_string(k), 4);
+    const std::vector<float> stored = streams.take(glossy_name(k), 4);
     for (std::size_t j = 4 * k; j < std::min(4 * k + 4, rank); ++j) {
       for (std::size_t v = 0; v < vertices; ++v)
         out.weights[(before + v) * rank + j] =

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/artifact/baked_scene.h"
@@ -18,6 +19,12 @@
 #include "core/prt/transfer.h"
 
 namespace kiln {
+
+/// The name of VEC4 k.
+inline std::string stored_name(const Transfer& shape, std::size_t k) {
+  return shape.order == 0 ? "_RADIOSITY" : "_PRT_" + std::to_string(k);
+}
+inline std::string glossy_name(std::size_t k) { return "_GLOSSY_" + std::to_string(k); }
 
 inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
 
@@ -42,6 +49,7 @@ class StoredTransfer {
   StoredTransfer(const Transfer&, const TransferEncoding&, std::span<const std::uint32_t> vertices);
 
   const StoredForm& form() const { return form_; }
+  std::string name(std::size_t vec4) const { return stored_name(transfer_, vec4); }
   int bits(std::size_t vec4) const { return bits_[vec4]; }
   /// The normalised numbers 4k .. 4k+3 of the given vertices.
   std::vector<float> pack(std::size_t k, std::span<const std::uint32_t> vertices) const;

@@ -27,7 +27,8 @@ json vec(const Vec3f& v) { return {v.x, v.y, v.z}; }
 
 void check_shape(const BakedScene& baked) {
   const Mesh& mesh = baked.scene.mesh;
-  EXPECTS(baked.transfer.order >= 1 && baked.transfer.order <= kMaxShOrder);
+  EXPECTS(baked.transfer.order >= 0 && baked.transfer.order <= kMaxShOrder);
+  EXPECTS(baked.transfer.order > 0 || (baked.transfer.fixed && baked.light.coefficients.empty()));
   EXPECTS(baked.transfer.channels == 1 || baked.transfer.channels == 3);
   EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
   EXPECTS(mesh.part.size() == mesh.triangles.size());
@@ -128,7 +129,7 @@ class Writer {
     const PartLook look = part_look(baked_.scene, part);
     baked["extensions"][kTransfer] = {
         {"name", part.name}, {"material", material}, {"albedo", vec(look.albedo)}, {"emission", vec(look.emission)}};
-    if (baked_attributes.contains("_GLOSSY_0")) baked["extensions"][kTransfer]["glossy"] = true;
+    if (baked_attributes.contains(glossy_name(0))) baked["extensions"][kTransfer]["glossy"] = true;
     json original = primitive_json(original_attributes, original_ids, add_view_again(view), indices);
     original["material"] = material;
     baked_primitives_.push_back(std::move(baked));
@@ -174,7 +175,7 @@ class Writer {
   json glossy_extension() const {
     const GlossyTransfer& g = baked_.glossy;
     json attributes = json::array();
-    for (std::size_t k = 0; k < glossy_->vec4s(); ++k) attributes.push_back("_GLOSSY_" + std::to_string(k));
+    for (std::size_t k = 0; k < glossy_->vec4s(); ++k) attributes.push_back(glossy_name(k));
     return {{"order", g.order},
             {"channels", g.channels},
             {"fixed", g.fixed},
@@ -189,7 +190,7 @@ class Writer {
     const Transfer& t = baked_.transfer;
     const StoredForm& form = transfer_->form();
     json attributes = json::array(), light = json::array();
-    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back("_PRT_" + std::to_string(k));
+    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back(transfer_->name(k));
     for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
     json out = {{"version", 2},
                 {"basis", "real-sh"},

@@ -19,6 +19,7 @@
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
 #include "core/bake/progressive.h"
+#include "core/bake/radiosity_step.h"
 #include "core/bake/report.h"
 #include "core/bake/transport.h"
 #include "core/base/sha256.h"
@@ -41,9 +42,12 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + (1U 
 
 Result<void> check_memory(const Plan& plan, const Limits& limits) {
   if (plan.prediction.memory_bytes <= limits.memory_mb << 20) return {};
-  return fault("memory_limit", "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
-                                   " and limits.memory_mb allows " + std::to_string(limits.memory_mb) +
-                                   " MB; lower /steps/0/subdivide/triangles or /steps/0/order, or raise the limit");
+  return fault("memory_limit",
+               "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
+                   " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
+                   (plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
+                                   : "lower /steps/0/subdivide/triangles or /steps/0/order") +
+                   ", or raise the limit");
 }
 
 std::string provenance(const BakeInput& input) {
@@ -86,7 +90,13 @@ Effort effort_of(const Recipe& recipe) {
   return recipe.promise ? first_effort(recipe.promise) : effort_of(recipe.quality);
 }
 
-/// The delivered file, read back, with the input's pixels so that textures show in the preview.
+Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
+  if (!recipe.radiosity) return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
+  return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, light ? &*light : nullptr, threads);
+}
+
+/// The delivered file, read back, with the input's pixels so that textures show in the preview, and its warnings
+/// for the report.
 Result<BakedScene> reopen(const Bytes& file, const Scene& scene) {
   KILN_TRY(decoded, read_baked_glb(file));
   decoded.scene.images = scene.images;
@@ -111,8 +121,15 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
                        BakeLog& log, Threads& threads) {
   Pass pass;
   BakedLight own;
-  if (light) own = {light->name, project_environment(*light, plan.order)};
-  Transport transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
+  Transport transport;
+  if (plan.radiosity) {
+    if (light) own.name = light->name;
+    plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
+    transport.transfer = solve_radiosity_step(scene, plan, light ? &*light : nullptr, log, threads);
+  } else {
+    if (light) own = {light->name, project_environment(*light, plan.order)};
+    transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
+  }
   log.begin("write", 0.9);
   const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
   const Probes noise = std::move(transport.noise);
@@ -133,7 +150,7 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     pass.certificate =
         certify(decoded, truth, light,
                 {.bake_rays = log.rays(), .thorough = bool{input.recipe.promise}, .seed = input.recipe.seed}, threads);
-    pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
+    if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
   }
   if (decoded.glossy) {
     pass.glossy = GlossyReport{.order = decoded.glossy.order,
@@ -221,7 +238,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   threads.check();
 
   log.begin("plan", 0.06);
-  const Plan plan = make_plan(scene, input.recipe.steps.front(), effort_of(input.recipe), threads);
+  const Plan plan = plan_of(scene, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   if (!light && !plan.lamps) {
@@ -229,7 +246,8 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
-  Passes passes(input.recipe.promise, input.recipe.steps.front(), input.recipe.limits);
+  const PrtStep step = input.recipe.radiosity ? PrtStep{} : input.recipe.steps.front();
+  Passes passes(input.recipe.promise, step, input.recipe.limits);
   KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, checkpoints, log, threads));
 
   log.share(0.97, 1);
@@ -263,8 +281,8 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
 
 Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   KILN_TRY(scene, read_scene(input));
-  if (auto light = job_light(input); !light) return tl::make_unexpected(light.error());
-  const Plan plan = make_plan(scene, input.recipe.steps.front(), effort_of(input.recipe), threads);
+  KILN_TRY(light, job_light(input));
+  const Plan plan = plan_of(scene, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   return plan_report_json(plan, scene, input.recipe.promise);

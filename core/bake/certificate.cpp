@@ -184,6 +184,18 @@ Samples judged_lightings(const Samples& all, const Lightings& lightings, double 
   return judged;
 }
 
+/// Of light that cannot be turned there is one lighting, the job's; a scene lit by nothing has error 0.
+Samples judged_job_light(const Samples& all, std::span<const double> weights, Certificate& certificate) {
+  const double truth = mean_size(all.truth, weights), shown = mean_size(all.shown, weights);
+  if (all.truth.empty() || (!(truth > 0) && !(shown > 0))) {
+    certificate.dark.push_back("job light");
+    return {};
+  }
+  certificate.lightings.push_back("job light");
+  certificate.mean_light.push_back(truth);
+  return all;
+}
+
 ErrorStats statistics(const Samples& samples, std::span<const double> weights, std::uint64_t seed) {
   return compute_error({samples.shown, samples.truth, samples.noise, weights.size(), weights}, {.seed = seed});
 }
@@ -250,7 +262,7 @@ ReferenceLight reference_light(const BakedScene& baked, const std::optional<Envi
   if (environment) light.environments.push_back(*environment);
   light.sh_order = baked.transfer.order;
   light.sh = lightings.sh;
-  light.scene_lights = baked.transfer.fixed;
+  light.scene_lights = baked.transfer.fixed;  // of order 0 always: it holds the job's light, lamps and all
   return light;
 }
 
@@ -260,7 +272,7 @@ class Judge {
       : baked_(baked),
         truth_(truth),
         threads_(threads),
-        lightings_(test_lightings(baked.transfer.order, baked.light)),
+        lightings_(baked.transfer.order > 0 ? test_lightings(baked.transfer.order, baked.light) : Lightings{}),
         light_(reference_light(baked, environment, lightings_)) {}
 
   Judgement judge(const Probe& probe, int samples, std::uint64_t seed) const {
@@ -271,12 +283,15 @@ class Judge {
     const auto kept = [&](const std::vector<Vec3d>& all) {
       return std::vector<Vec3d>(all.begin() + static_cast<std::ptrdiff_t>(skipped), all.end());
     };
+    Samples together = job_light_samples(baked_, probe, light_, reference);
+    if (baked_.transfer.order == 0) return {std::move(together), {}, reference.rays};
     return {{shown_values(baked_, probe, lightings_), kept(full.truth), kept(full.noise)},
-            job_light_samples(baked_, probe, light_, reference),
+            std::move(together),
             reference.rays};
   }
 
   Samples judged(const Judgement& all, std::span<const double> weights, Certificate& certificate) const {
+    if (baked_.transfer.order == 0) return judged_job_light(all.transport, weights, certificate);
     return judged_lightings(all.transport, lightings_, light_.scene_lights ? lamp_value(truth_.scene()) : 0, weights,
                             certificate);
   }

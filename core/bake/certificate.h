@@ -11,6 +11,7 @@
 //                  judged: relative to nothing, every rounding is an error.
 // Job light The artefact as the job lights it against that light in full detail, lamps and all: what `kiln eval` and
 //           `kiln reference` show. It adds what the order cannot hold of a sharp sky.
+// Radiosity (order 0) is one light only: the transport error is that of the job's light in full detail.
 // Seen      Points inside solids count (the artefact has light to tell there, and truth is black), but nobody sees them
 //           (core/prt/hidden.h): the transport error of the others is given besides.
 // Spending  A pilot tells the error and the reference's noise. Paths are as many as keep that noise below the error;

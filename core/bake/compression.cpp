@@ -66,7 +66,7 @@ StorageProbes probe_storage(const BakedScene& baked, const TransferEncoding& enc
 Compression choose_encoding(const BakedScene& baked, const Plan& plan) {
   using Form = PrtStep::Encoding::Form;
   Compression raw{{.bits = plan.encoding.bits.value_or(plan.raw_bits)}};
-  if (plan.encoding.form == Form::raw) return raw;
+  if (plan.encoding.form == Form::raw || baked.transfer.order == 0) return raw;
   Compression fewer = components(baked, plan);
   if (plan.encoding.form == Form::components || plan.encoding.rank) return fewer;
   return stored_bits(baked, fewer.encoding) < stored_bits(baked, raw.encoding) ? fewer : raw;

@@ -73,6 +73,12 @@ std::optional<std::int64_t> JsonFields::integer(const std::string& name, std::in
   return std::nullopt;
 }
 
+std::optional<double> JsonFields::number_or_auto(const std::string& name, double low, double high) {
+  const nlohmann::json* field = find(name);
+  if (field && field->is_string() && field->get_ref<const std::string&>() == "auto") return std::nullopt;
+  return number(name, low, high);
+}
+
 std::optional<std::int64_t> JsonFields::integer_or_auto(const std::string& name, std::int64_t low, std::int64_t high) {
   const nlohmann::json* field = find(name);
   if (field && field->is_string() && field->get_ref<const std::string&>() == "auto") return std::nullopt;

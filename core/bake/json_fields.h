@@ -25,6 +25,8 @@ class JsonFields {
   const nlohmann::json* find(const std::string& name, bool required = false);
 
   std::optional<double> number(const std::string& name, double low, double high);
+  /// As number, but "auto" counts as absent.
+  std::optional<double> number_or_auto(const std::string& name, double low, double high);
   std::optional<std::int64_t> integer(const std::string& name, std::int64_t low, std::int64_t high);
   /// As integer, but "auto" counts as absent.
   std::optional<std::int64_t> integer_or_auto(const std::string& name, std::int64_t low, std::int64_t high);

@@ -2,6 +2,7 @@
 // What a bake will model and what it leaves out, decided from cheap measurements, each with its reason.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "core/bake/glossy_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
+#include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
@@ -36,6 +38,7 @@ struct Plan {
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
   GlossyPlan glossy;
+  std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

@@ -128,18 +128,39 @@ PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors)
   return step;
 }
 
-std::vector<PrtStep> read_steps(const json& value, Errors& errors) {
-  std::vector<PrtStep> steps;
+RadiosityStep read_radiosity(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  RadiosityStep step;
+  const auto small = [](JsonFields& from, const char* name, std::int64_t low, std::int64_t high) -> std::optional<int> {
+    const auto value = from.integer_or_auto(name, low, high);
+    return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
+  };
+  fields.word("scheme", {"rows"});
+  if (const json* value = fields.find("points")) {
+    JsonFields points(*value, pointer + "/points", errors);
+    step.radius = points.number_or_auto("radius", 1e-9, 1e12);
+    step.levels = small(points, "levels", 1, 12);
+    points.finish();
+  }
+  step.eps_irradiance = fields.number_or_auto("eps_irradiance", 0, 1e6);
+  step.rays = small(fields, "rays", 1, 65536);
+  step.bounces = small(fields, "bounces", 0, 1000);
+  if (const json* value = fields.find("subdivide"))
+    step.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
+  return step;
+}
+
+void read_steps(const json& value, Recipe& recipe, Errors& errors) {
   if (!value.is_array() || value.size() != 1) {
     errors.push_back({"/steps", "must be a list with one step", shown(value), "[{\"do\": \"prt\"}]"});
-    return steps;
+    return;
   }
   JsonFields fields(value[0], "/steps/0", errors);
-  if (!fields.find("do", true)) return steps;
-  if (!fields.word("do", {"prt"})) return steps;
-  steps.push_back(read_prt(fields, "/steps/0", errors));
+  if (!fields.find("do", true)) return;
+  const auto step = fields.word("do", {"prt", "radiosity"});
+  if (!step) return;
+  if (*step == 0) recipe.steps.push_back(read_prt(fields, "/steps/0", errors));
+  if (*step == 1) recipe.radiosity = read_radiosity(fields, "/steps/0", errors);
   fields.finish();
-  return steps;
 }
 
 Promise read_promise(const json& value, Errors& errors) {
@@ -166,6 +187,10 @@ void read_quality(JsonFields& fields, Recipe& recipe, Errors& errors) {
 /// A promise is about the certificate, and needs something to spend on.
 void check_promise(const Recipe& recipe, Errors& errors) {
   if (!recipe.promise) return;
+  if (recipe.radiosity) {
+    errors.push_back(
+        {"/quality", "cannot be promised of a radiosity step: it is baked in one pass", "", "draft, standard, final"});
+  }
   if (!recipe.certificate)
     errors.push_back({"/certificate", "must not be off: what /quality promises is what it proves", "false", "true"});
   for (const PrtStep& step : recipe.steps) {
@@ -209,7 +234,7 @@ Recipe read_recipe(const json& document, Errors& errors) {
   }
   if (const json* value = fields.find("environment")) recipe.environment = read_environment(*value, errors);
   if (const json* value = fields.find("steps"))
-    recipe.steps = read_steps(*value, errors);
+    read_steps(*value, recipe, errors);
   else
     recipe.steps = {PrtStep{}};
   read_quality(fields, recipe, errors);
@@ -279,6 +304,16 @@ json step_json(const PrtStep& step) {
   return out;
 }
 
+json step_json(const RadiosityStep& step) {
+  return {{"do", "radiosity"},
+          {"scheme", "rows"},
+          {"points", {{"radius", or_auto(step.radius)}, {"levels", or_auto(step.levels)}}},
+          {"eps_irradiance", or_auto(step.eps_irradiance)},
+          {"rays", or_auto(step.rays)},
+          {"bounces", or_auto(step.bounces)},
+          {"subdivide", subdivision_json(step.subdivide)}};
+}
+
 }  // namespace
 
 tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view text) {
@@ -309,6 +344,7 @@ std::string recipe_json(const Recipe& recipe) {
       {"label", recipe.label},
       {"steps", json::array()}};
   for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
+  if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
   if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
   if (const json environment = environment_json(recipe.environment); !environment.is_null())
     out["environment"] = environment;
@@ -325,6 +361,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"final"})"},
       {"overcast", "Relightable diffuse light under an overcast sky",
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"overcast"}})"},
+      {"radiosity", "Light of one job, all reflections, under a clear sky with sun: not relightable, small and quick",
+       R"({"steps":[{"do":"radiosity"}],"environment":{"builtin":"clear"}})"},
       {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},
   };
   return all;

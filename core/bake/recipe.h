@@ -54,6 +54,16 @@ struct PrtStep {
   } glossy = Glossy::automatic;  // matrices: where they show, everywhere, nowhere
 };
 
+/// Light of one job at the vertices: no order, nothing to turn (core/meshless/radiosity.h).
+struct RadiosityStep {
+  std::optional<double> radius;  // of the coarsest points, in metres; auto when absent
+  std::optional<int> levels;
+  std::optional<double> eps_irradiance;  // prediction error that asks for finer points, of the mean light
+  std::optional<int> rays;               // of a gather
+  std::optional<int> bounces;
+  PrtStep::Subdivision subdivide;
+};
+
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"
 
 /// What a bake must reach instead of a quality: the error its certificate proves, the time it may take, or whichever of
@@ -73,8 +83,9 @@ struct Limits {
 struct Recipe {
   std::string scene_asset;  // sha256; empty when the scene is given otherwise
   EnvironmentChoice environment;
-  std::vector<PrtStep> steps;
-  Quality quality = Quality::standard;  // where nothing is promised
+  std::vector<PrtStep> steps;              // one, or none where there is a
+  std::optional<RadiosityStep> radiosity;  // step `radiosity`
+  Quality quality = Quality::standard;     // where nothing is promised
   Promise promise;
   std::uint64_t seed = 0;
   Limits limits;

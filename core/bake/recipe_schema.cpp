@@ -12,7 +12,59 @@ std::string recipe_schema() {
   "additionalProperties": false,
   "definitions": {
     "sha256": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
-    "auto": {"const": "auto"}
+    "auto": {"const": "auto"},
+    "subdivide": {
+      "default": "auto",
+      "anyOf": [{"enum": ["auto", "off"]}, {
+        "type": "object", "additionalProperties": false,
+        "properties": {
+          "measure": {"enum": ["residual", "eq2", "eq3", "eq4"], "default": "residual"},
+          "alpha": {"type": "number", "minimum": 0, "maximum": 1e6, "default": 1},
+          "threshold": {"description": "split while the measure is above", "type": "number", "minimum": 0, "maximum": 1e30},
+          "triangles": {"description": "budget of the final mesh", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 50000000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+          "max_depth": {"type": "integer", "minimum": 0, "maximum": 16, "default": 8}
+        }
+      }]
+    },
+    "prt": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "properties": {
+        "do": {"enum": ["prt"]},
+        "order": {"description": "SH bands; coefficients = order^2", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 10}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 64}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "samples": {"description": "rays per vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "solver": {"enum": ["vertices"], "default": "vertices"},
+        "glossy": {"description": "transfer matrices for specular reflection: auto where it shows, on everywhere", "enum": ["auto", "on", "off"], "default": "auto"},
+        "subdivide": {"$ref": "#/definitions/subdivide"},
+        "encoding": {
+          "type": "object", "additionalProperties": false,
+          "not": {"required": ["form", "rank"], "properties": {"form": {"const": "raw"}, "rank": {"type": "integer"}}},
+          "properties": {
+            "form": {"description": "raw: every coefficient; pca: weights of principal components; auto: what is smaller", "enum": ["auto", "raw", "pca"], "default": "auto"},
+            "rank": {"description": "components; auto: as few as a tenth of the error target allows", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 300}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+            "bits": {"description": "of each stored number", "anyOf": [{"type": "integer", "minimum": 4, "maximum": 20}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+          }
+        }
+      }
+    },
+    "radiosity": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "properties": {
+        "do": {"enum": ["radiosity"]},
+        "scheme": {"description": "rows: the transport operator is traced once and kept", "enum": ["rows"], "default": "rows"},
+        "points": {
+          "type": "object", "additionalProperties": false,
+          "properties": {
+            "radius": {"description": "of the coarsest points, metres", "anyOf": [{"type": "number", "minimum": 1e-9, "maximum": 1e12}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+            "levels": {"description": "each halves the radius", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 12}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+          }
+        },
+        "eps_irradiance": {"description": "prediction error that asks for finer points, of the mean light", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "subdivide": {"$ref": "#/definitions/subdivide"}
+      }
+    }
   },
   "properties": {
     "scene": {"type": "object", "additionalProperties": false, "properties": {"asset": {"$ref": "#/definitions/sha256"}}},
@@ -30,39 +82,7 @@ std::string recipe_schema() {
     },
     "steps": {
       "type": "array", "minItems": 1, "maxItems": 1, "default": [{"do": "prt"}],
-      "items": {
-        "type": "object", "required": ["do"], "additionalProperties": false,
-        "properties": {
-          "do": {"enum": ["prt"]},
-          "order": {"description": "SH bands; coefficients = order^2", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 10}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-          "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 64}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-          "samples": {"description": "rays per vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-          "solver": {"enum": ["vertices"], "default": "vertices"},
-          "glossy": {"description": "transfer matrices for specular reflection: auto where it shows, on everywhere", "enum": ["auto", "on", "off"], "default": "auto"},
-          "subdivide": {
-            "default": "auto",
-            "anyOf": [{"enum": ["auto", "off"]}, {
-              "type": "object", "additionalProperties": false,
-              "properties": {
-                "measure": {"enum": ["residual", "eq2", "eq3", "eq4"], "default": "residual"},
-                "alpha": {"type": "number", "minimum": 0, "maximum": 1e6, "default": 1},
-                "threshold": {"description": "split while the measure is above", "type": "number", "minimum": 0, "maximum": 1e30},
-                "triangles": {"description": "budget of the final mesh", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 50000000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-                "max_depth": {"type": "integer", "minimum": 0, "maximum": 16, "default": 8}
-              }
-            }]
-          },
-          "encoding": {
-            "type": "object", "additionalProperties": false,
-            "not": {"required": ["form", "rank"], "properties": {"form": {"const": "raw"}, "rank": {"type": "integer"}}},
-            "properties": {
-              "form": {"description": "raw: every coefficient; pca: weights of principal components; auto: what is smaller", "enum": ["auto", "raw", "pca"], "default": "auto"},
-              "rank": {"description": "components; auto: as few as a tenth of the error target allows", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 300}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-              "bits": {"description": "of each stored number", "anyOf": [{"type": "integer", "minimum": 4, "maximum": 20}, {"$ref": "#/definitions/auto"}], "default": "auto"}
-            }
-          }
-        }
-      }
+      "items": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}]}
     },
     "quality": {
       "default": "standard",

@@ -98,7 +98,22 @@ ordered_json glossy_object(const GlossyReport& g) {
   return out;
 }
 
+ordered_json radiosity_parameters(const Plan& plan) {
+  const Radiosity& r = *plan.radiosity;
+  return {{"scheme", "rows"},
+          {"radius_unit_cube", r.points.radius},
+          {"levels", r.points.levels},
+          {"rays", r.rays},
+          {"eps_irradiance", r.eps},
+          {"bounces", r.bounces < 0 ? ordered_json("auto") : ordered_json(r.bounces)},
+          {"lamp_rays", {r.direct.lamps.few, r.direct.lamps.many}},
+          {"sky_rays", r.direct.sky},
+          {"triangles", plan.subdivide.triangles},
+          {"threshold", plan.subdivide.threshold}};
+}
+
 ordered_json parameters_object(const Plan& plan) {
+  if (plan.radiosity) return radiosity_parameters(plan);
   constexpr const char* kMeasures[] = {"residual", "eq2", "eq3", "eq4"};
   return {{"order", plan.order},
           {"bounces", plan.bounces},

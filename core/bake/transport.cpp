@@ -40,6 +40,7 @@ class DirectSource {
         .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
         .bounded = {lamp_columns()},
         .hidden = hidden_test(tracer_),
+        .pierced = pierce_test(tracer_),
         .rough =
             [this](std::span<const TransferPoint> batch) {
               return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));
@@ -115,26 +116,6 @@ class DirectSource {
   Threads& threads_;
   float lamp_scale_;
 };
-
-/// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
-/// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
-/// triangle's perimeter.
-Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
-  const std::uint64_t input = mesh.triangles.size();
-  const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
-  const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
-  const ValueSource positions{3, [](std::span<const TransferPoint> points) {
-                                std::vector<float> values;
-                                for (const TransferPoint& p : points)
-                                  values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
-                                return values;
-                              }};
-  // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
-  const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
-  return subdivide(mesh, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
-                   threads)
-      .mesh;
-}
 
 /// The mesh to light and the joined columns of direct light at its vertices.
 Subdivided bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
@@ -218,6 +199,26 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 }
 
 }  // namespace
+
+/// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
+/// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
+/// triangle's perimeter.
+Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
+  const std::uint64_t input = mesh.triangles.size();
+  const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
+  const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
+  const ValueSource positions{3, [](std::span<const TransferPoint> points) {
+                                std::vector<float> values;
+                                for (const TransferPoint& p : points)
+                                  values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
+                                return values;
+                              }};
+  // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
+  const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
+  return subdivide(mesh, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
+                   threads)
+      .mesh;
+}
 
 DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
                         std::uint64_t seed, Threads& threads) {

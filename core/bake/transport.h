@@ -34,6 +34,9 @@ inline constexpr int kRoughRays = 4;  // so many times fewer for points that onl
 DirectTransfer sky_rays(const Tracer&, const Plan&, const std::vector<double>& band_power, std::uint64_t seed,
                         Threads&);
 
+/// A quarter of the planned triangles on the longest ones: reflected light varies where direct light does not.
+Mesh refine_base(const Mesh&, const Plan&, Threads&);
+
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.
 /// `band_power` as in lightings.h: by it rays are spent.

@@ -1,5 +1,5 @@
 #pragma once
-// The vertex halfway along an edge.
+// Vertices along an edge.
 
 #include <cstdint>
 
@@ -16,5 +16,8 @@ Vec3f middle_normal(const Mesh&, std::uint32_t a, std::uint32_t b);
 /// Appends the vertex halfway between a and b and returns its index. Every attribute of the mesh is interpolated;
 /// normal and tangent are made unit again (a tangent is that of the lower index where the two cancel; so is its sign).
 std::uint32_t append_midpoint(Mesh&, std::uint32_t a, std::uint32_t b);
+
+/// The same at `share` of the way from a to b. The position is the same bits for vertices at the places of a and b.
+std::uint32_t append_between(Mesh&, std::uint32_t a, std::uint32_t b, float share);
 
 }  // namespace kiln

@@ -15,6 +15,10 @@ Vec3f area_vector(const Mesh& mesh, const Triangle& t) {
   return cross(mesh.position[t[1]] - mesh.position[t[0]], mesh.position[t[2]] - mesh.position[t[0]]);
 }
 
+Vec3f centroid(const Mesh& mesh, const Triangle& t) {
+  return (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F;
+}
+
 double triangle_area(const Mesh& mesh, const Triangle& t) {
   const Vec3d a = to_double(mesh.position[t[0]]);
   return 0.5 * length(cross(to_double(mesh.position[t[1]]) - a, to_double(mesh.position[t[2]]) - a));

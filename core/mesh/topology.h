@@ -13,6 +13,7 @@ std::vector<std::uint32_t> weld_by_position(const std::vector<Vec3f>& position);
 
 /// Twice-area vector of a triangle: its direction is the face normal by winding.
 Vec3f area_vector(const Mesh&, const Triangle&);
+Vec3f centroid(const Mesh&, const Triangle&);
 double triangle_area(const Mesh&, const Triangle&);
 double surface_area(const Mesh&);
 

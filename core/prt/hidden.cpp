@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/mesh/topology.h"
+#include "core/prt/pierce.h"
 #include "core/prt/ray_origin.h"
 
 namespace kiln {
@@ -60,15 +61,7 @@ struct Crossing {
 };
 
 TransferPoint point_between(const Mesh& mesh, const Crossing& edge, float share) {
-  const Triangle& t = mesh.triangles[edge.triangle];
-  const Vec3f& a = mesh.position[edge.seen];
-  const Vec3f& b = mesh.position[edge.hidden];
-  const Vec3f normal =
-      normalized(mesh.normal[edge.seen] * (1 - share) + mesh.normal[edge.hidden] * share, mesh.normal[edge.seen]);
-  return {.position = a + (b - a) * share,
-          .normal = normal,
-          .inward = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F,
-          .face_normal = normalized(area_vector(mesh, t), normal)};
+  return between(mesh, mesh.triangles[edge.triangle], edge.seen, edge.hidden, share);
 }
 
 struct Candidate {
@@ -86,12 +79,13 @@ Candidate last_seen(const Mesh& mesh, const Crossing& edge, const HiddenTest& hi
   return {{edge.hidden, point}, length(mesh.position[edge.hidden] - point.position)};
 }
 
-/// Verdicts on a list of points.
-std::vector<bool> test_all(const std::vector<TransferPoint>& points, const HiddenTest& test, Threads& threads) {
+/// Verdicts on the points point_at(0) to point_at(count - 1).
+template <class PointAt>
+std::vector<bool> test_all(std::size_t count, const PointAt& point_at, const HiddenTest& test, Threads& threads) {
   constexpr std::size_t kBlock = 64;
-  std::vector<char> verdict(points.size());
-  threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) verdict[i] = test(points[i]) ? 1 : 0;
+  std::vector<char> verdict(count);
+  threads.for_blocks(count, kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) verdict[i] = test(point_at(i)) ? 1 : 0;
   });
   return {verdict.begin(), verdict.end()};
 }
@@ -127,16 +121,24 @@ HiddenTest hidden_test(const Tracer& tracer) {
   return [&tracer, directions = hemisphere()](const TransferPoint& p) { return is_hidden(tracer, directions, p); };
 }
 
-std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& dark, const HiddenTest& test,
-                                    Threads& threads) {
-  const std::vector<TransferPoint> points = vertex_points(mesh);
-  const std::vector<bool> hidden = test_all(points, test, threads);
+std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<StandIn>& known, const std::vector<bool>& dark,
+                                    const HiddenTest& test, Threads& threads) {
+  const std::vector<std::uint32_t> face = widest_faces(mesh);
+  const auto point_of = [&](std::size_t i) {
+    const auto v = static_cast<std::uint32_t>(i);
+    const auto at = std::ranges::lower_bound(known, v, {}, &StandIn::vertex);
+    return at != known.end() && at->vertex == v ? at->point : vertex_point(mesh, v, face[v]);
+  };
+  const std::vector<bool> hidden = test_all(mesh.position.size(), point_of, test, threads);
   std::vector<Candidate> found = from_crossings(mesh, hidden, test, threads);
   if (!dark.empty()) {
     for_edges(mesh, [&](std::uint32_t a, std::uint32_t b, std::uint32_t) {
-      if (dark[a] && !hidden[a] && !dark[b]) found.push_back({{a, points[a]}, 0});
+      if (dark[a] && !hidden[a] && !dark[b]) found.push_back({{a, point_of(a)}, 0});
     });
   }
+  std::erase_if(found, [&](const Candidate& c) {
+    return std::ranges::binary_search(known, c.stand_in.vertex, {}, &StandIn::vertex);
+  });
   std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) {
     return a.stand_in.vertex != b.stand_in.vertex ? a.stand_in.vertex < b.stand_in.vertex : a.distance < b.distance;
   });
@@ -159,7 +161,8 @@ std::vector<bool> hidden_middles(const Mesh& mesh, const std::vector<MeshEdge>& 
     edge_of.push_back(static_cast<std::size_t>(at - edges.begin()));
     points.push_back(point_between(mesh, {a, b, t}, 0.5F));
   });
-  const std::vector<bool> hidden = test_all(points, test, threads);
+  const auto point_at = [&](std::size_t i) { return points[i]; };
+  const std::vector<bool> hidden = test_all(points.size(), point_at, test, threads);
   std::vector<bool> out(edges.size(), false);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (hidden[i]) out[edge_of[i]] = true;

@@ -11,6 +11,7 @@ namespace kiln {
 /// A linear map from lighting to the radiance that leaves a white point, for each vertex:
 ///   value[c](v) = sum_i at(v, c)[i] * L_i[c]  (+ at(v, c)[sh_count(order)] where `fixed`: light of the scene's own
 ///   lamps)
+/// Order 0 with `fixed` is light that cannot be turned: radiosity, the light of one job (core/meshless).
 /// Shape   coefficients[(v * channels + c) * slots + i];  slots = order^2 + (fixed ? 1 : 0)
 struct Transfer {
   int order = 0;

@@ -254,14 +254,17 @@ void bench_memory(const std::string& name, const Scene& scene, Threads& threads)
       name.c_str(), vertices, t.channels, direct_peak / vertices, bounce_peak / vertices, t.stride() * sizeof(float));
 }
 
-// Peak memory of adaptive subdivision by residuals to twice the triangles, beside the input and its tracer; the final
-// mesh is in it, and given apart.
+// Peak memory of adaptive subdivision as a bake does it, to twice the triangles, beside the input and its tracer; the
+// final mesh is in it, and given apart.
 void bench_subdivision_memory(const std::string& name, const Scene& scene, Threads& threads) {
   constexpr std::size_t kBands = 36;
   const Tracer tracer(scene, threads);
   const DirectTransferBaker baker(tracer, {.samples = 16});
-  const ValueSource source{
-      kBands, [&](std::span<const TransferPoint> points) { return baker.bake(points, threads); }, {0}};
+  const ValueSource source{.width = kBands,
+                           .values = [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); },
+                           .bounded = {0},
+                           .hidden = hidden_test(tracer),
+                           .pierced = pierce_test(tracer)};
   const std::size_t before = held_bytes;
   peak_bytes = before;
   const Subdivided fine = subdivide(scene.mesh, source, {.triangles = 2 * scene.mesh.triangles.size()}, threads);

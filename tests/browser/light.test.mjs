@@ -7,7 +7,8 @@ import { load } from './sources.mjs';
 const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCount } = await load('light/sh.ts');
 const { sphereQuadrature } = await load('light/quadrature.ts');
 const { directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
-const { decodeAttribute, relight, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
+const { coefficientsOf, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
+const { lightOfStored, readExtension } = await load('asset/kiln_reader.ts');
 const { kSkies, projectSky } = await load('light/skies.ts');
 const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
 const { edgesOf } = await load('main/wireframe.ts');
@@ -20,6 +21,22 @@ const shAt = (order, x, y, z) => {
   evaluateSh(order, x, y, z, out);
   return out;
 };
+/// The `_PRT_k` of `coefficients`, stored as they are, and what a file would say of them.
+function stored(shape, coefficients) {
+  const count = shape.channels * shape.slots;
+  const each = (value) => new Array(count).fill(value);
+  const attributes = Array.from({ length: Math.ceil(count / 4) }, (_, k) =>
+    Float32Array.from({ length: (4 * coefficients.length) / count }, (_, at) => {
+      const j = 4 * k + (at & 3);
+      return j < count ? coefficients[(at >> 2) * count + j] : 9; // padding
+    }),
+  );
+  return { transfer: { ...shape, form: 'raw', rows: new Float32Array(0), scale: each(1), offset: each(0) }, attributes };
+}
+function relight(shape, coefficients, light, lamps) {
+  const { transfer, attributes } = stored(shape, coefficients);
+  return lightOfStored(transfer, attributes, light, lamps);
+}
 const unit = (x, y, z) => [x, y, z].map((v) => v / Math.hypot(x, y, z));
 
 test('the first four harmonics have the constants and signs of core/sphere/sh.h', () => {
@@ -139,21 +156,21 @@ test('halving a map keeps its integral', () => {
   fine.forEach((value, i) => near(coarse[i], value, 1e-5 * value));
 });
 
-test('attributes decode to offset + scale * stored, four flat slots each, zero padding ignored', () => {
-  const slots = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
-  const attributes = [
-    Float32Array.of(0.1, 0.2, 0.3, 0.4, -0.1, -0.2, -0.3, -0.4),
-    Float32Array.of(0.5, 0.6, 9, 9, -0.5, -0.6, 9, 9),
-  ];
+test('attributes decode to offset + scale * stored, four flat slots each, padding ignored', () => {
+  const shape = { order: 1, channels: 3, fixed: true, slots: 2 }; // 6 flat slots in two VEC4
+  const numbers = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+  const { transfer, attributes } = stored(shape, [...numbers, ...numbers.map((s) => -s)]);
   const [scale, offset] = [
     [1, 2, 3, 4, 5, 6],
     [10, 20, 30, 40, 50, 60],
   ];
-  const out = new Float32Array(12);
-  attributes.forEach((stored, k) => decodeAttribute({ ...slots, scale, offset }, k, stored, out));
-  const stored = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-  for (let v = 0; v < 2; ++v)
-    stored.forEach((s, slot) => near(out[6 * v + slot], offset[slot] + scale[slot] * (v === 0 ? s : -s), 1e-5));
+  const out = coefficientsOf({ ...transfer, scale, offset }, attributes);
+  const light = lightOfStored({ ...transfer, scale, offset }, attributes, [1, 2, 4], true);
+  for (const [v, sign] of [1, -1].entries()) {
+    const expected = numbers.map((s, slot) => offset[slot] + scale[slot] * sign * s);
+    expected.forEach((value, slot) => near(out[6 * v + slot], value, 1e-5));
+    [1, 2, 4].forEach((l, c) => near(light[3 * v + c], l * expected[2 * c] + expected[2 * c + 1], 1e-4));
+  }
 });
 
 test('grey transfer lights each channel by its own light; lamps can be put out', () => {
@@ -162,6 +179,16 @@ test('grey transfer lights each channel by its own light; lamps can be put out',
   const light = Float32Array.of(1, 10, 100);
   assert.deepEqual([...relight(shape, coefficients, light, true)], [2.25, 20.25, 200.25]);
   assert.deepEqual([...relight(shape, coefficients, light, false)], [2, 20, 200]);
+});
+
+test('radiosity is read as the lamps’ light of order 0', () => {
+  const shape = { order: 0, channels: 3, fixed: true, slots: 1 };
+  assert.deepEqual([...relight(shape, Float32Array.of(1, 0.5, 0.25), new Float32Array(0), true)], [1, 0.5, 0.25]);
+  const { scale, offset } = stored(shape, [1, 1, 1]).transfer;
+  const extension = { ...shape, version: 2, form: 'raw', attributes: ['_RADIOSITY'], scale, offset };
+  const read = (changes) => readExtension({ extensions: { KILN_radiance_transfer: { ...extension, ...changes } } });
+  assert.equal(read({}).order, 0);
+  assert.throws(() => read({ fixed: false, slots: 0, scale: [], offset: [], attributes: [] }), /does not describe/);
 });
 
 test('RGB transfer takes each channel’s own slots', () => {

@@ -9,7 +9,8 @@ import { fromViewer, load } from './sources.mjs';
 const { splitGlb, joinGlb } = await load('asset/glb.ts');
 const { readPacked, unpack: unpackRead } = await load('asset/unpack.ts');
 const unpack = (decoder, bytes) => unpackRead(decoder, readPacked(bytes));
-const { coefficientsOf, relight } = await load('light/transfer.ts');
+const { lightOfStored } = await load('asset/kiln_reader.ts');
+const { coefficientsOf } = await load('light/transfer.ts');
 const draco = await fromViewer('draco3dgltf').createDecoderModule({});
 
 const file = readFileSync(new URL('fixtures/scene.glb', import.meta.url));
@@ -91,9 +92,9 @@ test('images are the same bytes', () => {
 
 test('the transfer vectors are apart, those of the file, and nowhere in the plain file', () => {
   assert.equal(unpacked.baked.length, baked.parts.length);
-  unpacked.baked.forEach(({ numbers, positions, indices }, i) => {
+  unpacked.baked.forEach(({ stored, positions, indices }, i) => {
     const part = baked.parts[i];
-    assert.deepEqual(coefficientsOf(unpacked.form, numbers), Float32Array.from(part.transfer)); // doubles rounded once
+    assert.deepEqual(coefficientsOf(unpacked.transfer, stored), Float32Array.from(part.transfer)); // doubles rounded once
     assert.deepEqual(positions, part.position);
     assert.deepEqual(indices, numbersOf(plain.json.meshes[0].primitives[i].indices));
   });
@@ -104,24 +105,24 @@ test('the transfer vectors are apart, those of the file, and nowhere in the plai
 test('components give the light that the file defines, lamps and all, and the coefficients behind it', async () => {
   const bytes = readFileSync(new URL('fixtures/components.glb', import.meta.url));
   const { extension, parts } = await decodeBaked(bytes);
-  const { form, baked: read, file: written } = unpack(draco, bufferOf(bytes));
-  assert.equal(form.components.rank, extension.components.rank);
+  const { transfer, baked: read, file: written } = unpack(draco, bufferOf(bytes));
+  assert.equal(transfer.components.rank, extension.components.rank);
   const light = Float32Array.from({ length: 3 * extension.order ** 2 }, (_, i) => Math.sin(i)); // of size 1, any signs
   const kSums = 2e-5; // float32 numbers, rows and sums of 20 terms below 4, against double
-  read.forEach(({ numbers }, i) => {
+  read.forEach(({ stored }, i) => {
     for (const lamps of [true, false]) {
-      const values = relight(form, numbers, light, lamps);
+      const values = lightOfStored(transfer, stored, light, lamps);
       for (let v = 0; v < parts[i].vertices; v += 5)
         valueAt(extension, parts[i], v, light, lamps).forEach((value, c) =>
           assert.ok(Math.abs(values[3 * v + c] - value) < kSums, `${values[3 * v + c]} is not ${value}`),
         );
     }
-    coefficientsOf(form, numbers).forEach((t, k) => assert.ok(Math.abs(t - parts[i].transfer[k]) < kSums));
+    coefficientsOf(transfer, stored).forEach((t, k) => assert.ok(Math.abs(t - parts[i].transfer[k]) < kSums));
   });
   const { json, binary } = glbJson(Buffer.from(written));
   const { byteOffset = 0, byteLength } = json.bufferViews[json.extensions.KILN_radiance_transfer.components.bufferView];
   const rows = new Float32Array(bufferOf(binary.subarray(byteOffset, byteOffset + byteLength)));
-  assert.deepEqual(rows, form.components.rows);
+  assert.deepEqual(rows, transfer.rows);
 });
 
 test('what the decoder lends it gets back: a hundred files need no more memory than a few', () => {

@@ -350,6 +350,58 @@ test('a job that is still baked is followed until it can be shown', async () => 
   await page.context().close();
 });
 
+test('the bake’s own picture is shown until the live one is, unless another view is asked for', async () => {
+  for (const [hash, shown] of [
+    ['', true],
+    ['#light=constant', false],
+  ]) {
+    const page = await openPage(browser, 'about:blank');
+    let go = () => {};
+    const gate = new Promise((resolve) => (go = resolve));
+    await page.route('**/scene.glb', async (route) => {
+      await gate;
+      await route.continue();
+    });
+    await page.goto(`${mock.url}${kView}${hash}`);
+    await until(page, () => document.title.endsWith('– Kiln')); // the job is known
+    if (shown) await until(page, () => document.querySelector('img.preview')?.naturalWidth > 0);
+    assert.equal(await page.locator('img.preview').isVisible(), shown);
+    go();
+    await ready(page);
+    assert.equal(await page.locator('img.preview').count(), 0);
+    await page.context().close();
+  }
+});
+
+test('the first view holds the whole model in the 3:2 picture of preview.png, whatever the canvas', async () => {
+  for (const viewport of [
+    { width: 1280, height: 700 },
+    { width: 700, height: 1100 },
+  ])
+    await withViewer(
+      '',
+      async (page) => {
+        const { across, along } = await page.evaluate(() => {
+          const { stage, model } = window.kilnViewer;
+          const { aspect } = stage.camera; // the picture fills the canvas along one side, and a share of the other:
+          const [wide, high] = [Math.min(1, 1.5 / aspect), Math.min(1, aspect / 1.5)];
+          const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => {
+            const { min, max } = model.bounds;
+            const pick = (bit, axis) => (bits & bit ? max[axis] : min[axis]);
+            return stage.camera.position.clone().set(pick(1, 'x'), pick(2, 'y'), pick(4, 'z')).project(stage.camera);
+          });
+          return {
+            across: Math.max(...corners.map(({ x }) => Math.abs(x))) / wide,
+            along: Math.max(...corners.map(({ y }) => Math.abs(y))) / high,
+          };
+        });
+        assert.ok(across < 1 && along < 1, `${across} x ${along}`);
+        assert.ok(Math.max(across, along) > 0.7, `${across} x ${along}: too far away`); // margin 1.06, corners in depth
+      },
+      { viewport },
+    );
+});
+
 test('a failed job and an unknown one say why', async () => {
   for (const [id, words] of [
     [jobId('failed'), /element 812: index 70001/],

@@ -65,6 +65,10 @@ TEST(DamagedGlb, EachBrokenPromiseHasItsCode) {
   EXPECT_EQ(code_of(with_json(file, "\"version\":2,", "\"version\":1,")), "unsupported_version");
   EXPECT_EQ(code_of(with_json(file, "\"order\":2", "\"order\":3")), "slot_count_mismatch");
   EXPECT_EQ(code_of(with_json(file, "\"order\":2", "\"order\":11")), "number_out_of_range");
+  EXPECT_EQ(code_of(with_json(file, "\"order\":2", "\"order\":0")), "slot_count_mismatch");
+  const Bytes without_lamps = *write_baked_glb(random_baked({.order = 2, .fixed = false, .side = 4}));
+  EXPECT_EQ(code_of(with_json(without_lamps, "\"order\":2", "\"order\":0")), "number_out_of_range");
+  EXPECT_EQ(code_of(with_json(file, "\"order\":2,", "")), "number_out_of_range");
   EXPECT_EQ(code_of(with_json(file, "\"channels\":3", "\"channels\":2")), "number_out_of_range");
   EXPECT_EQ(code_of(with_json(file, "\"channels\":3", "\"channels\":\"3\"")), "json_type");
   EXPECT_EQ(code_of(with_json(file, "\"exposure\":1", "\"exposure\":0")), "number_out_of_range");

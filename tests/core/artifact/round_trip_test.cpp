@@ -62,6 +62,19 @@ TEST(BakedScene, EverySlotComesBackWithinHalfAQuantisationStep) {
   }
 }
 
+TEST(BakedScene, LightThatCannotBeTurnedComesBackAsWell) {
+  BakedScene written = random_baked({.order = 0, .channels = 3, .fixed = true, .side = 5});
+  written.light.coefficients.clear();
+  const BakedScene read = round_trip(written);
+  EXPECT_EQ(read.transfer.order, 0);
+  EXPECT_EQ(read.transfer.slots(), 1);
+  EXPECT_TRUE(read.transfer.fixed);
+  EXPECT_LE(worst_slot_error(written, read, 12), 1);
+  const auto original = original_vertices(read);
+  const Vec3f light = value_at(read.transfer, 7, {});  // what `kiln eval` shows
+  EXPECT_NEAR(light.y, written.transfer.at(original[7], 1)[0], 1e-3F);
+}
+
 TEST(BakedScene, TheBoundIsTight) {
   // Random values meet the middle between levels: a bound twice as large as needed would show here.
   const BakedScene written = random_baked({.order = 4});

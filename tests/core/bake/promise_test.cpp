@@ -136,21 +136,19 @@ Plan next_after(const PassRecord& pass) {
   return *passes.next(plan, Scene{});
 }
 
-/// The column's worst: a strip of floor, a thousandth of the surface, that few evenly drawn points meet. Over five
-/// seeds certificates of even points went from .009 to .045; those of points drawn where light changes from .024 to
-/// .027.
-TEST(Promise, CertificatesOfOneSceneAgreeAboutRareGrossErrors) {
-  double least = 1, most = 0;
+/// Bakes that differ by their seed only have about one error, and every certificate has to allow it.
+TEST(Promise, CertificatesOfOneSceneAgree) {
+  double low = 0, high = 1;
   for (int seed = 0; seed < 4; ++seed) {
     Threads threads;
     const auto output = bake(input_of("column", R"({"seed":)" + std::to_string(seed) +
                                                     R"(,"environment":{"builtin":"clear"},"quality":"draft"})"),
                              {}, threads);
-    const double error = report_of(*output)["certificate"]["relrmse"];
-    least = std::min(least, error);
-    most = std::max(most, error);
+    const auto certificate = report_of(*output)["certificate"];
+    low = std::max(low, certificate["interval"][0].get<double>());
+    high = std::min(high, certificate["interval"][1].get<double>());
   }
-  EXPECT_LT(most, 2 * least);  // meshes differ a little with the seed; even points differ fivefold
+  EXPECT_LE(low, high);
 }
 
 TEST(Promise, TheNextPassSpendsOnTheLargestSource) {

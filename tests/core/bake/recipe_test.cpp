@@ -91,5 +91,25 @@ TEST(Recipe, IdentityIgnoresWhatLeavesTheBytesAlone) {
   EXPECT_NE(recipe_identity(*a), recipe_identity(*c));
 }
 
+TEST(Recipe, OfRadiosityHasItsOwnParametersAndSurvivesARoundTrip) {
+  const auto recipe = parse_recipe(
+      R"({"steps":[{"do":"radiosity","points":{"radius":0.25,"levels":4},"rays":64,"subdivide":{"triangles":900}}]})");
+  ASSERT_TRUE(recipe);
+  EXPECT_TRUE(recipe->steps.empty());
+  ASSERT_TRUE(recipe->radiosity);
+  EXPECT_EQ(recipe->radiosity->radius, 0.25);
+  EXPECT_EQ(recipe->radiosity->levels, 4);
+  EXPECT_EQ(recipe->radiosity->rays, 64);
+  EXPECT_FALSE(recipe->radiosity->bounces);
+  const auto again = parse_recipe(recipe_json(*recipe));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
+}
+
+TEST(Recipe, PromisesNothingOfRadiosity) {
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity"}]})"),
+            (std::vector<std::string>{"/quality"}));
+}
+
 }  // namespace
 }  // namespace kiln

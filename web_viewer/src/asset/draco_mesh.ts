@@ -63,13 +63,12 @@ export class DracoMesh {
   /// The attribute of Draco's unique `id`, `components` numbers for each point.
   floats(id: number, components: number): Float32Array<ArrayBuffer> {
     let out = this.read.get(id);
-    if (!out) this.read.set(id, (out = this.lend(id, components, (numbers) => numbers.slice())));
+    if (!out) this.read.set(id, (out = this.readFloats(id, components)));
     if (out.length !== components * this.points) throw new Error(`attribute ${id} has two meanings`);
     return out;
   }
 
-  /// The same numbers where the decoder has them, for as long as `use` runs: nothing is copied.
-  lend<T>(id: number, components: number, use: (numbers: Float32Array<ArrayBuffer>) => T): T {
+  private readFloats(id: number, components: number): Float32Array<ArrayBuffer> {
     const { draco, decoder, mesh } = this;
     const attribute = decoder.GetAttributeByUniqueId(mesh, id);
     if (attribute.ptr === 0 || attribute.num_components() !== components)
@@ -78,7 +77,7 @@ export class DracoMesh {
     return this.borrow(4 * count, (at) => {
       const good = decoder.GetAttributeDataArrayForAllPoints(mesh, attribute, draco.DT_FLOAT32, 4 * count, at);
       if (!good) throw new Error(`attribute ${id} of the geometry cannot be read`);
-      return use(draco.HEAPF32.subarray(at / 4, at / 4 + count));
+      return draco.HEAPF32.slice(at / 4, at / 4 + count);
     });
   }
 

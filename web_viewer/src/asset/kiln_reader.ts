@@ -45,10 +45,14 @@ export interface TransferPart {
   material: number; // index of the original material, -1 if none
 }
 
-export interface RadianceTransfer extends RadianceTransferExtension {
+/// What the stored numbers of a vertex mean.
+export interface StoredTransfer extends RadianceTransferExtension {
+  rows: Float32Array; // of the components, after their mean: (rank + 1) x channels x slots; empty: raw
+}
+
+export interface RadianceTransfer extends StoredTransfer {
   parts: TransferPart[];
   bakedLight: Float32Array; // see bakedLight()
-  rows: Float32Array; // of the components, after their mean: (rank + 1) x channels x slots; empty: raw
 }
 
 /// The part of GLTFLoader's result that is read here.
@@ -108,7 +112,7 @@ function checkShape(e: RadianceTransferExtension): void {
   const good =
     (e.form === 'raw' || (e.form === 'components' && Number.isInteger(rank) && rank >= 1)) &&
     Number.isInteger(e.order) &&
-    e.order >= 1 &&
+    e.order >= (e.fixed ? 0 : 1) && // 0: radiosity, light that cannot be changed
     (e.channels === 1 || e.channels === 3) &&
     e.slots === slots &&
     e.scale?.length === numbers &&
@@ -128,31 +132,39 @@ export function transferAttributes(e: RadianceTransferExtension, geometry: Buffe
 }
 
 /// RGB that leaves a white surface at every vertex under SH `light` (light[3 * i + channel], order^2 entries or more).
-/// `lamps`: add the light of the scene's own lamps where it was baked. 50 000 vertices of order 6 in RGB take about 30 ms;
-/// decode once and keep the numbers (as this viewer's worker does) if the light changes often.
-export function lightValues(
+/// `lamps`: add the light of the scene's own lamps where it was baked. 50 000 vertices of order 6 in RGB take about 10 ms.
+export const lightValues = (
   e: RadianceTransfer,
   geometry: BufferGeometry,
   light: ArrayLike<number>,
   lamps = true,
+): Float32Array => lightOfStored(e, transferAttributes(e, geometry), light, lamps);
+
+/// The same from the `_PRT_k` arrays themselves. `out` may be given for reuse.
+export function lightOfStored(
+  e: StoredTransfer,
+  attributes: readonly Float32Array[],
+  light: ArrayLike<number>,
+  lamps: boolean,
+  out: Float32Array = new Float32Array((3 * attributes[0].length) / 4),
 ): Float32Array {
-  const attributes = transferAttributes(e, geometry);
-  const vertices = attributes[0].length / 4;
-  const out = new Float32Array(3 * vertices);
-  const { mean, gains } = lightOfNumbers(e, light, lamps);
-  for (let v = 0; v < vertices; ++v) out.set(mean, 3 * v);
-  gains.forEach((rgb, j) => {
-    const stored = attributes[j >> 2];
-    rgb.forEach((gain, c) => {
-      const [factor, shift] = [e.scale[j] * gain, e.offset[j] * gain];
-      if (gain !== 0) for (let v = 0; v < vertices; ++v) out[3 * v + c] += shift + factor * stored[4 * v + (j & 3)];
-    });
+  const { none, gains } = lightOfNumbers(e, light, lamps);
+  for (let v = 0; v < out.length; v += 3) [out[v], out[v + 1], out[v + 2]] = none;
+  attributes.forEach((stored, k) => {
+    for (let c = 0; c < 3; ++c) addLight(stored, [0, 1, 2, 3].map((i) => gains[4 * k + i]?.[c] ?? 0), out, c);
   });
   return out;
 }
 
-/// The RGB light that one of each stored number brings, and what is there without any.
-function lightOfNumbers(e: RadianceTransfer, light: ArrayLike<number>, lamps: boolean) {
+/// Adds what one attribute brings to channel `c`.
+function addLight(stored: Float32Array, [g0, g1, g2, g3]: number[], out: Float32Array, c: number): void {
+  if (g0 === 0 && g1 === 0 && g2 === 0 && g3 === 0) return;
+  for (let from = 0, to = c; from < stored.length; from += 4, to += 3)
+    out[to] += g0 * stored[from] + g1 * stored[from + 1] + g2 * stored[from + 2] + g3 * stored[from + 3];
+}
+
+/// The RGB light that one of each stored number brings, and what is there when all are 0.
+function lightOfNumbers(e: StoredTransfer, light: ArrayLike<number>, lamps: boolean) {
   const count = e.order * e.order;
   const ofSlot = (slot: number, c: number): number => {
     const [i, channel] = [slot % e.slots, Math.floor(slot / e.slots)];
@@ -168,10 +180,17 @@ function lightOfNumbers(e: RadianceTransfer, light: ArrayLike<number>, lamps: bo
     });
   const rank = e.components?.rank ?? 0;
   const isRaw = e.form === 'raw';
-  const gains = e.scale.map((_, j) => {
+  const ofNumber = (j: number): number[] => {
     if (!isRaw && j < rank) return ofRow(j + 1);
     const slot = isRaw ? j : (j - rank + 1) * e.slots - 1; // after the components: the lamps of a channel
     return [0, 1, 2].map((c) => ofSlot(slot, c));
-  });
-  return { mean: isRaw ? [0, 0, 0] : ofRow(0), gains };
+  };
+  const none = isRaw ? [0, 0, 0] : ofRow(0);
+  const gains = e.scale.map((scale, j) =>
+    ofNumber(j).map((gain, c) => {
+      none[c] += e.offset[j] * gain;
+      return scale * gain;
+    }),
+  );
+  return { none, gains };
 }

@@ -5,7 +5,6 @@
 
 import { type Group, TextureLoader, type Object3D } from 'three';
 import { GLTFLoader, type GLTF, type GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
-import type { OpenReply } from '../light/messages';
 
 interface Json {
   scenes?: unknown[];
@@ -18,8 +17,8 @@ export interface LoadedAsset {
   loadOriginal(): Promise<Object3D>; // scene 1; a new load at each call
 }
 
-/// What is loaded belongs to the caller.
-export async function parseGltf({ file, bytes }: OpenReply): Promise<LoadedAsset> {
+/// `file`: the unpacked one. What is loaded belongs to the caller.
+export async function parseGltf(file: ArrayBuffer, bytes: number): Promise<LoadedAsset> {
   let scenes: unknown[] = [];
   const loader = new GLTFLoader();
   loader.register((parser) => {

@@ -3,21 +3,20 @@
 // KHR_draco_mesh_compression becomes ordinary accessors, in both scenes; these share their compressed bytes, and each mesh is
 // decoded once. The transfer vectors, and the COLOR_0 that stands for them in other viewers, stay out of the GLB.
 
-import { decodeAttribute, numbersOf, type TransferForm } from '../light/transfer';
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
-import { componentRows, readExtension, type RadianceTransferExtension } from './kiln_reader';
+import { componentRows, readExtension, type RadianceTransferExtension, type StoredTransfer } from './kiln_reader';
 
 /// One baked primitive. Its vertices are in the order of the GLB's.
 export interface BakedPrimitive {
-  numbers: Float32Array; // as light/transfer.ts has them
+  stored: Float32Array[]; // its `_PRT_k`, four numbers of each vertex
   positions: Float32Array;
   indices: Uint32Array;
 }
 
 export interface Unpacked {
   file: ArrayBuffer;
-  form: TransferForm;
+  transfer: StoredTransfer;
   baked: BakedPrimitive[]; // in the order of the file
 }
 
@@ -77,7 +76,7 @@ export function readPacked(file: ArrayBuffer): Packed {
 
 /// Uses up `packed`. Throws as readPacked does.
 export function unpack(draco: DracoModule, { json, binary, extension }: Packed): Unpacked {
-  const form = formOf(extension, json, binary);
+  const transfer = { ...extension, rows: rowsOf(extension, json, binary) };
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
   const out = new Binary();
@@ -89,7 +88,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     const mesh = new DracoMesh(draco, bytes);
     try {
       for (const primitive of sharing) {
-        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, { extension, form }));
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension.attributes));
         makePlain(primitive, json, mesh, { accessors, out });
       }
     } finally {
@@ -103,7 +102,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   json.extensionsRequired = json.extensionsRequired?.filter((name) => name !== kDraco);
   return {
     file: joinGlb(json, out.pieces),
-    form,
+    transfer,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
   };
 }
@@ -143,11 +142,9 @@ function entry<T>(list: T[] | undefined, index: number, what: string): T {
   return found;
 }
 
-function formOf(extension: RadianceTransferExtension, json: Json, binary: Uint8Array<ArrayBuffer>): TransferForm {
-  const { order, channels, fixed, slots, components } = extension;
-  if (!components) return { order, channels, fixed, slots };
-  const rows = componentRows(extension, bytesOf(json, binary, components.bufferView).slice().buffer);
-  return { order, channels, fixed, slots, components: { rank: components.rank, rows } };
+function rowsOf(extension: RadianceTransferExtension, json: Json, binary: Uint8Array<ArrayBuffer>): Float32Array {
+  if (!extension.components) return new Float32Array(0);
+  return componentRows(extension, bytesOf(json, binary, extension.components.bufferView).slice().buffer);
 }
 
 function moveImages(json: Json, binary: Uint8Array<ArrayBuffer>, out: Binary): void {
@@ -175,22 +172,15 @@ function byCompressedBytes(
 }
 
 /// Takes the transfer vectors, and what stands for them, out of the primitive.
-function takeBaked(
-  primitive: Primitive,
-  mesh: DracoMesh,
-  { extension, form }: { extension: RadianceTransferExtension; form: TransferForm },
-): BakedPrimitive {
+function takeBaked(primitive: Primitive, mesh: DracoMesh, names: readonly string[]): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
-  const idOf = (name: string) => {
+  const floatsOf = (name: string, components: number) => {
     if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
-    return ids[name];
+    return mesh.floats(ids[name], components);
   };
-  const numbers = new Float32Array(mesh.points * numbersOf(form));
-  extension.attributes.forEach((name, k) =>
-    mesh.lend(idOf(name), 4, (stored) => decodeAttribute(extension, k, stored, numbers)),
-  );
-  for (const name of [...extension.attributes, 'COLOR_0']) delete primitive.attributes[name];
-  return { numbers, positions: mesh.floats(idOf('POSITION'), 3), indices: mesh.indices() };
+  const stored = names.map((name) => floatsOf(name, 4));
+  for (const name of [...names, 'COLOR_0']) delete primitive.attributes[name];
+  return { stored, positions: floatsOf('POSITION', 3), indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

@@ -55,13 +55,16 @@ export function functionToEquirect(
   width: number,
 ): EquirectMap {
   const height = width / 2;
-  const data = new Float32Array(4 * width * height);
+  const data = new Float32Array(4 * width * height).fill(1);
   const rgb = new Float64Array(3);
-  for (let texel = 0; texel < width * height; ++texel) {
-    const { x, y, z } = directionAt(((texel % width) + 0.5) / width, (Math.floor(texel / width) + 0.5) / height);
-    radiance(x, y, z, rgb);
-    data.set(rgb, 4 * texel);
-    data[4 * texel + 3] = 1;
+  const equator = Array.from({ length: width }, (_, column) => directionAt((column + 0.5) / width, 0.5));
+  for (let row = 0, to = 0; row < height; ++row) {
+    const { y } = directionAt(0, (row + 0.5) / height);
+    const radius = Math.sqrt(1 - y * y);
+    for (let column = 0; column < width; ++column, to += 4) {
+      radiance(radius * equator[column].x, y, radius * equator[column].z, rgb);
+      for (let c = 0; c < 3; ++c) data[to + c] = rgb[c];
+    }
   }
   return { width, height, stride: 4, data };
 }

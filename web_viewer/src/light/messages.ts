@@ -1,14 +1,12 @@
-// What the page and the light worker say to each other. Each request is answered by one reply with its `serial`; `progress`
-// and `header` are news and no answer yet.
+// What the page and the light worker say to each other. Each request is answered by one reply with its `serial`. The worker
+// begins: its first message is a reply to no request.
 
-import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import type { EquirectMap } from './equirect';
 
-/// Fetches a scene.glb, keeps its transfer vectors and hands over the rest. `progress` replies come while it arrives, one of
-/// `header` when it is there: decoding it takes longer than what the page can do meanwhile.
+/// Unpacks a scene.glb, keeps its transfer vectors and hands over the rest.
 export interface OpenRequest {
   kind: 'open';
-  url: string;
+  file: ArrayBuffer;
 }
 
 export interface RelightRequest {
@@ -57,20 +55,9 @@ export interface ProjectReply {
   map: EquirectMap;
 }
 
-export interface OpenReply {
-  file: ArrayBuffer; // a GLB without compression and without transfer vectors
-  bytes: number; // of scene.glb itself
-}
-
-export interface ProgressReply {
-  loaded: number; // bytes
-  total: number; // 0: unknown
-}
-
 export type Reply = { serial: number } & (
-  | { opened: OpenReply }
-  | { progress: ProgressReply }
-  | { header: RadianceTransferExtension }
+  | { begun: true }
+  | { opened: ArrayBuffer } // a GLB without compression and without transfer vectors
   | { values: ValuesReply }
   | { projected: ProjectReply }
   | { failure: string }

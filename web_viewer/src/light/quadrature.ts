@@ -1,4 +1,4 @@
-// Product Gauss quadrature on the sphere.
+// Product Gauss quadrature on the sphere, cut at the horizon y = 0: skies jump there.
 
 export interface QuadraturePoint {
   x: number;
@@ -9,8 +9,8 @@ export interface QuadraturePoint {
 
 const known = new Map<number, QuadraturePoint[]>();
 
-/// `rows` Gauss-Legendre rows in z times 2 * rows equal steps in azimuth: exact for polynomials of degree 2 * rows - 1.
-/// The weights sum to 4 pi. Computed once for each size.
+/// `rows` Gauss-Legendre rows in y for each half times 2 * rows equal steps in azimuth: exact for polynomials of degree
+/// 2 * rows - 1. The weights sum to 4 pi. Computed once for each size.
 export function sphereQuadrature(rows: number): readonly QuadraturePoint[] {
   let points = known.get(rows);
   if (!points) known.set(rows, (points = buildSphere(rows)));
@@ -19,11 +19,17 @@ export function sphereQuadrature(rows: number): readonly QuadraturePoint[] {
 
 function buildSphere(rows: number): QuadraturePoint[] {
   const points: QuadraturePoint[] = [];
-  for (const [z, weight] of gaussLegendre(rows)) {
-    const radius = Math.sqrt(1 - z * z);
-    for (let k = 0; k < 2 * rows; ++k) {
-      const angle = (Math.PI * (k + 0.5)) / rows;
-      points.push({ x: radius * Math.cos(angle), y: radius * Math.sin(angle), z, weight: (weight * Math.PI) / rows });
+  const circle = Array.from({ length: 2 * rows }, (_, k) => (Math.PI * (k + 0.5)) / rows);
+  for (const [node, weight] of gaussLegendre(rows)) {
+    for (const y of [(node - 1) / 2, (node + 1) / 2]) {
+      const radius = Math.sqrt(1 - y * y);
+      for (const angle of circle)
+        points.push({
+          x: radius * Math.cos(angle),
+          y,
+          z: radius * Math.sin(angle),
+          weight: (weight * Math.PI) / (2 * rows),
+        });
     }
   }
   return points;

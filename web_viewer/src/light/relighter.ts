@@ -1,45 +1,37 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
-import type { RadianceTransferExtension } from '../asset/kiln_reader';
-import type { OpenReply, ProgressReply, ProjectReply, Reply, Request, ValuesReply } from './messages';
+import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
 
-type Header = RadianceTransferExtension;
-type News = { progress?(news: ProgressReply): void; header?(header: Header): void };
-type Answer = { resolve(reply: Reply): void; reject(error: Error): void; news: News };
+type Answer = { resolve(reply: Reply): void; reject(error: Error): void };
 
 export class Relighter {
   private readonly worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
   private readonly waiting = new Map<number, Answer>();
   private serial = 0;
   private failure: Error | null = null; // a worker that has stopped answers nothing any more
+  /// The worker runs by itself from then on; until then it needs this thread.
+  readonly begun: Promise<void>;
+  private begin: () => void = () => {};
 
   constructor() {
+    this.begun = new Promise((resolve) => (this.begin = resolve));
     this.worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => this.settle(data));
     this.worker.addEventListener('error', (event) =>
       this.failAll(new Error(event.message || 'the light worker stopped')),
     );
   }
 
-  /// The worker fetches the scene.glb at `url`: everything below is about that file then.
-  open(url: string, progress: (news: ProgressReply) => void): { header: Promise<Header>; opened: Promise<OpenReply> } {
-    let tell: (header: Header) => void = () => {};
-    const opened = this.opened(url, { progress, header: (header) => tell(header) });
-    const header = new Promise<Header>((resolve, reject) => {
-      tell = resolve;
-      opened.catch(reject);
-    });
-    return { header, opened };
-  }
-
-  private async opened(url: string, news: News): Promise<OpenReply> {
-    const reply = await this.ask({ kind: 'open', url }, [], news);
+  /// Takes the bytes of a scene.glb, and resolves with a GLB without its compression and transfer vectors. Everything below is
+  /// about that file then.
+  async open(file: ArrayBuffer): Promise<ArrayBuffer> {
+    const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
     return reply.opened;
   }
 
   /// Light at every vertex of every part. `reuse`: arrays of an earlier reply that are no longer needed.
   relight(light: Float32Array, lamps: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
-    return this.values({ kind: 'relight', light, lamps, reuse }, reuse);
+    return this.values({ kind: 'relight', light, lamps, reuse }, buffersOf(reuse));
   }
 
   async level(light: Float32Array): Promise<number> {
@@ -65,26 +57,24 @@ export class Relighter {
     this.failAll(new DOMException('the viewer was closed', 'AbortError'));
   }
 
-  private async values(request: Request, give: Float32Array[] = []): Promise<ValuesReply> {
+  private async values(request: Request, give: ArrayBuffer[] = []): Promise<ValuesReply> {
     const reply = await this.ask(request, give);
     if (!('values' in reply)) throw new Error('the light worker answered another question');
     return reply.values;
   }
 
-  private ask(request: Request, give: Float32Array[], news: News = {}): Promise<Reply> {
+  private ask(request: Request, transfer: ArrayBuffer[]): Promise<Reply> {
     const serial = ++this.serial;
-    const transfer = [...new Set(give.map((array) => array.buffer))];
     return new Promise((resolve, reject) => {
       if (this.failure) return reject(this.failure);
-      this.waiting.set(serial, { resolve, reject, news });
+      this.waiting.set(serial, { resolve, reject });
       this.worker.postMessage({ ...request, serial }, { transfer });
     });
   }
 
   private settle(reply: Reply): void {
+    if ('begun' in reply) return this.begin();
     const answer = this.waiting.get(reply.serial);
-    if ('progress' in reply) return answer?.news.progress?.(reply.progress);
-    if ('header' in reply) return answer?.news.header?.(reply.header);
     this.waiting.delete(reply.serial);
     if ('failure' in reply) answer?.reject(new Error(reply.failure));
     else answer?.resolve(reply);
@@ -96,3 +86,7 @@ export class Relighter {
     this.waiting.clear();
   }
 }
+
+const buffersOf = (arrays: Float32Array[]): ArrayBuffer[] => [
+  ...new Set(arrays.map((array) => array.buffer as ArrayBuffer)),
+];

@@ -34,14 +34,14 @@ const added = (rgb: Float64Array, tint: Rgb, by: number): void => {
 
 /// A soft lamp: peak radiance in the middle, falling off as a von Mises-Fisher lobe; `sharpness` 20 is about 25 degrees wide.
 const lobe = (x: number, y: number, z: number, [dx, dy, dz]: Rgb, sharpness: number): number =>
-  Math.exp(sharpness * ((x * dx + y * dy + z * dz) / Math.hypot(dx, dy, dz) - 1));
+  Math.exp(sharpness * ((x * dx + y * dy + z * dz) / Math.sqrt(dx * dx + dy * dy + dz * dz) - 1));
+
+const indicatrix = (angle: number): number => 0.91 + 10 * Math.exp(-3 * angle) + 0.45 * Math.cos(angle) ** 2;
+const gradation = (sine: number): number => 1 - Math.exp(-0.32 / Math.max(sine, 1e-6));
+const kClearZenith = indicatrix(Math.PI / 4) * gradation(1);
 
 /// CIE clear sky, relative to the zenith; `sine` of the elevation, `chi` the angle from the sun.
-function clearSky(sine: number, chi: number): number {
-  const indicatrix = (a: number) => 0.91 + 10 * Math.exp(-3 * a) + 0.45 * Math.cos(a) ** 2;
-  const gradation = (s: number) => 1 - Math.exp(-0.32 / Math.max(s, 1e-6));
-  return (indicatrix(chi) * gradation(sine)) / (indicatrix(Math.PI / 4) * gradation(1));
-}
+const clearSky = (sine: number, chi: number): number => (indicatrix(chi) * gradation(sine)) / kClearZenith;
 
 export const kSkies: readonly Sky[] = [
   {
@@ -62,7 +62,7 @@ export const kSkies: readonly Sky[] = [
     radiance: (x, y, z, rgb) => {
       const sine = Math.max(y, 0);
       const [sx, sy, sz] = kSunDirection;
-      const cosine = (x * sx + sine * sy + z * sz) / Math.hypot(x, sine, z);
+      const cosine = (x * sx + sine * sy + z * sz) / Math.sqrt(x * x + sine * sine + z * z);
       const chi = Math.acos(Math.min(1, Math.max(-1, cosine)));
       scaled(rgb, kSkyTint, (y >= 0 ? 1 : kGroundReflectance) * clearSky(sine, chi));
     },

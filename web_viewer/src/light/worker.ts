@@ -1,64 +1,49 @@
 // The light worker: opens one asset, holds its transfer vectors and answers messages.ts.
 
-import { download } from '../asset/download';
 import { loadDraco } from '../asset/draco_module';
+import { lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
-import {
-  coefficientsOf,
-  pickCoefficient,
-  quantile,
-  relight,
-  triangleMeasure,
-  type TransferForm,
-} from './transfer';
+import { coefficientsOf, pickCoefficient, quantile, triangleMeasure } from './transfer';
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
-const kNewsEvery = 100; // ms between two pieces of news of the download: each is a repaint
 
 const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
 
-let form: TransferForm = { order: 0, channels: 1, fixed: false, slots: 0 };
+let transfer: StoredTransfer; // of the open file
 let parts: BakedPrimitive[] = [];
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
-async function open({ url }: OpenRequest, serial: number): Promise<void> {
-  let next = 0;
-  const downloaded = await download(url, (loaded, total) => {
-    if (performance.now() < next) return;
-    next = performance.now() + kNewsEvery;
-    send({ serial, progress: { loaded, total } });
-  });
-  const packed = readPacked(downloaded);
-  send({ serial, header: packed.extension });
-  const unpacked = unpack(await decoder, packed);
-  const { file } = unpacked;
-  [form, parts] = [unpacked.form, unpacked.baked];
-  send({ serial, opened: { file, bytes: downloaded.byteLength } }, [file]);
+async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
+  const unpacked = unpack(await decoder, readPacked(file));
+  [transfer, parts] = [unpacked.transfer, unpacked.baked];
+  return unpacked.file;
 }
+
+const relight = (light: Float32Array, lamps: boolean, reuse: Float32Array[]): Float32Array[] =>
+  parts.map(({ stored }, i) => lightOfStored(transfer, stored, light, lamps, reuse[i]));
 
 /// Lamps count: they are there whatever the sky.
 function level(light: Float32Array): number {
-  const brightest = parts.map((p) => {
-    const values = relight(form, p.numbers, light, true);
-    return Float32Array.from({ length: values.length / 3 }, (_, v) =>
+  const brightest = relight(light, true, []).map((values) =>
+    Float32Array.from({ length: values.length / 3 }, (_, v) =>
       Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]),
-    );
-  });
+    ),
+  );
   return rangeOf(brightest, 0.9);
 }
 
-const allCoefficients = (): Float32Array[] => (coefficients ??= parts.map((p) => coefficientsOf(form, p.numbers)));
+const allCoefficients = (): Float32Array[] => (coefficients ??= parts.map(({ stored }) => coefficientsOf(transfer, stored)));
 
 function measure(weighted: boolean): Float32Array[] {
-  return allCoefficients().map((t, i) => triangleMeasure(form, t, parts[i].positions, parts[i].indices, weighted));
+  return allCoefficients().map((t, i) => triangleMeasure(transfer, t, parts[i].positions, parts[i].indices, weighted));
 }
 
 function coefficient(channel: number, slot: number): Float32Array[] {
-  return allCoefficients().map((t) => pickCoefficient(form, t, channel, slot));
+  return allCoefficients().map((t) => pickCoefficient(transfer, t, channel, slot));
 }
 
 async function project(request: ProjectRequest): Promise<ProjectReply> {
@@ -86,10 +71,7 @@ function timed(compute: () => Float32Array[], ranged: boolean): ValuesReply {
 function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): ValuesReply {
   switch (request.kind) {
     case 'relight':
-      return timed(
-        () => parts.map((p, i) => relight(form, p.numbers, request.light, request.lamps, request.reuse[i])),
-        false,
-      );
+      return timed(() => relight(request.light, request.lamps, request.reuse), false);
     case 'level':
       return { values: [], range: level(request.light), milliseconds: 0 };
     case 'measure':
@@ -107,7 +89,8 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
   const { serial } = data;
   try {
     if (data.kind === 'open') {
-      await open(data, serial);
+      const opened = await open(data);
+      send({ serial, opened }, [opened]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);
@@ -119,3 +102,5 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
     send({ serial, failure: error instanceof Error ? error.message : String(error) });
   }
 });
+
+send({ serial: 0, begun: true });

@@ -11,7 +11,8 @@ export interface LightChoice {
 }
 
 const kHarmonicsWidth = 128; // SH of order 10 resolve 20 degrees; 128 texels are 2.8 degrees apart
-const kSkyWidth = 512;
+const kSkyWidth = 256; // a sun's glow is three texels wide
+const kReflectedWidth = 512;
 const kSameSky = 0.02; // core spreads the sun over texels of a map, we take a point: they differ by 0.0008 at order 4
 
 export class Lights {
@@ -31,9 +32,9 @@ export class Lights {
     this.known.set('baked', withOrder(baked, order));
     this.choices.push({
       id: 'baked',
-      label: baked.length > 0 ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
+      label: baked.length > 0 || (order === 0 && this.bakedName) ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
     });
-    this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
+    if (order > 0) this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
   }
 
   addFile(name: string, light: Float32Array, map: EquirectMap): void {
@@ -67,7 +68,7 @@ export class Lights {
   /// What three's image-based light gets: no suns (its filter loses small bright spots; they come as lamps) and no detail.
   reflection(id: string): { picture: () => EquirectMap; suns: readonly Sun[] } {
     const sky = this.skyOf(id);
-    if (sky) return { picture: () => functionToEquirect(sky.radiance, kSkyWidth), suns: sky.suns };
+    if (sky) return { picture: () => functionToEquirect(sky.radiance, kReflectedWidth), suns: sky.suns };
     return { picture: () => lightToEquirect(this.order, this.coefficients(id), kHarmonicsWidth), suns: [] };
   }
 
@@ -85,6 +86,7 @@ export class Lights {
   private skyOf(id: string): Sky | undefined {
     if (id !== 'baked') return kSkies.find((one) => one.id === id);
     const named = kSkies.find((one) => one.id === this.bakedName);
+    if (this.order === 0) return named; // there is nothing to compare
     return named && relativeDistance(this.coefficients(named.id), this.coefficients('baked')) < kSameSky
       ? named
       : undefined;

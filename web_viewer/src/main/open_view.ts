@@ -1,13 +1,17 @@
-// The entry of `/view/{id}`, kept small so that it runs early: asks for the job, sets the light worker to fetch and decode its
-// scene.glb, and makes the WebGL context. three.js and all that uses it (view.ts) arrive meanwhile.
+// The entry of `/view/{id}`, kept small so that it runs early: asks for the job, fetches its scene.glb, sets the light worker to
+// decode it, and makes the WebGL context. three.js and all that uses it (view.ts) arrive meanwhile.
 
 import { artifact, artifactUrl, explain, finished, follow, getJob, type Job } from '../asset/jobs';
+import { download } from '../asset/download';
+import { readPacked } from '../asset/unpack';
 import { Relighter } from '../light/relighter';
 import { announce } from '../ui/dom';
 import { bytes } from '../ui/format';
 import { applyTheme } from '../ui/theme';
 import { Page } from './page';
 import { createContext } from './webgl';
+
+const kNewsEvery = 100; // ms between two pieces of news of the download: each is a repaint
 
 applyTheme();
 
@@ -36,16 +40,14 @@ function checkShowable(job: Job): void {
     throw new Error(job.error ? explain(job.error) : `The job is ${job.status}; there is nothing to show.`);
 }
 
-/// `begun` resolves with the first that is heard of it.
-function openScene(url: string, relighter: Relighter, { overlay }: Page) {
-  let hear = () => {};
-  const heard = new Promise<void>((resolve) => (hear = resolve));
-  const { header, opened } = relighter.open(url, ({ loaded, total }) => {
-    hear();
+function fetchScene(url: string, { overlay }: Page): Promise<ArrayBuffer> {
+  let next = 0;
+  return download(url, (loaded, total) => {
+    if (performance.now() < next) return;
+    next = performance.now() + kNewsEvery;
     const [text, fraction] = total ? [`${bytes(loaded)} of ${bytes(total)}`, loaded / total] : [bytes(loaded), null];
     overlay.show(`Loading ${text}`, fraction);
   });
-  return { header, opened, begun: Promise.race([heard, header]) };
 }
 
 async function open(page: Page): Promise<void> {
@@ -58,12 +60,18 @@ async function open(page: Page): Promise<void> {
   document.title = `${asked.label || page.id} – Kiln`;
   const job = await whenFinished(asked, page);
   checkShowable(job);
-  const { header, opened, begun } = openScene(artifactUrl(job, 'scene.glb'), relighter, page);
-  await begun; // a worker cannot start while the next line blocks this thread
+  const asBaked = location.hash.length < 2; // else another view was asked for
+  if (asBaked && artifact(job, 'preview.png')) page.showPreview(artifactUrl(job, 'preview.png'));
+  const file = await fetchScene(artifactUrl(job, 'scene.glb'), page);
+  performance.mark('kiln:fetched');
+  const size = file.byteLength;
+  const { extension } = readPacked(file);
+  const opened = relighter.open(file);
+  await relighter.begun; // it cannot start while the next line blocks this thread
   const context = createContext(page.canvas);
   performance.mark('kiln:context');
   const { show } = await viewer;
-  await show(page, job, { context, relighter, header, opened });
+  await show(page, job, { context, relighter, extension, opened, size });
 }
 
 async function start(): Promise<void> {
@@ -73,7 +81,7 @@ async function start(): Promise<void> {
   try {
     await open(page);
   } catch (error) {
-    page.overlay.fail((error as Error).message);
+    page.fail((error as Error).message);
     page.dispose();
   }
 }

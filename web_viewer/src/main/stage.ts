@@ -31,11 +31,15 @@ export type CameraPose = readonly [number, number, number, number, number, numbe
 
 const kPlainBackground = 0x5b5e64; // about that of preview.png
 
-export const kDefaultPose: CameraPose = [1.35, 0.95, 1.9, 0, 0, 0];
+// The first picture is framed as preview.png is (core/bake/preview.cpp): one takes the place of the other.
+export const kDefaultPose: CameraPose = [0.9, 0.84, 1.8, 0, 0, 0];
+const kHalfView = 0.32; // tangent of half the vertical angle of a 3:2 picture, all of which any canvas shows
+const kHalfWidth = 1.5 * kHalfView;
+const kMargin = 1.06;
 
 export class Stage {
   readonly scene = new Scene();
-  readonly camera = new PerspectiveCamera(38, 1, 0.01, 100);
+  readonly camera = new PerspectiveCamera();
   readonly renderer: WebGLRenderer;
   readonly controls: OrbitControls;
   /// Called in place of the plain draw when set (the comparison draws two halves).
@@ -128,17 +132,14 @@ export class Stage {
     this.requestDraw();
   }
 
-  /// How far from the centre the camera must stand to see every corner of the box, with a margin.
+  /// How far from the centre the camera must stand to have every corner of the box in the 3:2 picture, with a margin.
   private framingDistance(): number {
-    const margin = 1.12;
-    const up = Math.tan((this.camera.fov * Math.PI) / 360) / margin;
-    const side = up * this.camera.aspect;
     const turn = this.camera.quaternion.clone().invert();
     let distance = 0.1 * this.bounds.radius;
     for (let corner = 0; corner < 8; ++corner) {
       const pick = (bit: number, axis: 'x' | 'y' | 'z') => (corner & bit ? this.box.max[axis] : this.box.min[axis]);
       const seen = new Vector3(pick(1, 'x'), pick(2, 'y'), pick(4, 'z')).sub(this.bounds.center).applyQuaternion(turn);
-      distance = Math.max(distance, seen.z + Math.max(Math.abs(seen.x) / side, Math.abs(seen.y) / up));
+      distance = Math.max(distance, seen.z + kMargin * Math.max(Math.abs(seen.x) / kHalfWidth, Math.abs(seen.y) / kHalfView));
     }
     return distance;
   }
@@ -155,6 +156,7 @@ export class Stage {
     if (clientWidth === 0 || clientHeight === 0) return;
     this.renderer.setDrawingBufferSize(clientWidth, clientHeight, pixelRatio());
     this.camera.aspect = clientWidth / clientHeight;
+    this.camera.fov = (360 / Math.PI) * Math.atan(Math.max(kHalfView, kHalfWidth / this.camera.aspect));
     this.camera.updateProjectionMatrix();
     if (this.frame >= 0) this.drawNow(); // a resized canvas is blank: do not wait for the next frame
   }

@@ -3,9 +3,7 @@
 import { artifact, artifactUrl, getReport, type Job, type Report } from '../asset/jobs';
 import type { RadianceTransferExtension } from '../asset/kiln_reader';
 import { parseGltf } from '../asset/parse_gltf';
-import type { OpenReply } from '../light/messages';
 import type { Relighter } from '../light/relighter';
-import { kSkies } from '../light/skies';
 import { announce, copyText, h, toast } from '../ui/dom';
 import { Divider } from '../ui/divider';
 import { helpDialog } from '../ui/help';
@@ -34,26 +32,30 @@ const kLegendTitles: Partial<Record<ViewState['mode'], string>> = {
 export interface Begun {
   context: WebGL2RenderingContext;
   relighter: Relighter; // with the job's scene.glb
-  header: Promise<RadianceTransferExtension>;
-  opened: Promise<OpenReply>;
+  extension: RadianceTransferExtension;
+  opened: Promise<ArrayBuffer>; // the scene.glb without compression and transfer vectors
+  size: number; // of scene.glb itself
 }
 
 /// Resolves when the picture is shown and the page is complete.
-export async function show(page: Page, job: Job, { context, relighter, header, opened }: Begun): Promise<void> {
+export async function show(page: Page, job: Job, begun: Begun): Promise<void> {
+  const { context, relighter, extension, opened, size } = begun;
   const stage = new Stage(page.canvas, context);
   page.onDispose(() => stage.dispose());
   performance.mark('kiln:stage');
   const report: Promise<Report | null> = artifact(job, 'report.json')
     ? getReport(job).catch(() => null)
     : Promise.resolve(null);
-  const state = new Store(decodeState(location.hash.slice(1), ['baked', ...kSkies.map((sky) => sky.id)]));
-  const pictures = new SkyPictures(new Lights(await header));
+  const lights = new Lights(extension);
+  const known = lights.choices.map(({ id }) => id);
+  const state = new Store(decodeState(location.hash.slice(1), known));
+  const pictures = new SkyPictures(lights);
   pictures.prepare(state.get()); // while the worker decodes
-  const asset = await parseGltf(await opened);
+  const asset = await parseGltf(await opened, size);
   performance.mark('kiln:decoded');
   const viewer = await Viewer.open(stage, asset, state, { relighter, pictures });
   page.onDispose(() => viewer.dispose());
-  page.overlay.hide();
+  page.showCanvas();
   performance.mark('kiln:first-picture');
   announce('The model is shown');
   furnish(page, viewer, job, await report);

@@ -14,6 +14,7 @@ import {
 import type { EquirectMap } from '../light/equirect';
 
 const kLargestHalf = 65504;
+const kHalfOfOne = 0x3c00;
 
 /// Data row 0 is the top of the map. three looks equirectangular maps up with v from the bottom, so `forReflection`
 /// turns the rows round.
@@ -28,7 +29,7 @@ export function skyTexture(map: EquirectMap, forReflection: boolean): DataTextur
       const to = 4 * (row * map.width + column);
       for (let c = 0; c < 3; ++c)
         data[to + c] = DataUtils.toHalfFloat(Math.min(Math.max(map.data[from + c], least), kLargestHalf));
-      data[to + 3] = DataUtils.toHalfFloat(1);
+      data[to + 3] = kHalfOfOne;
     }
   }
   const texture = new DataTexture(data, map.width, map.height, RGBAFormat, HalfFloatType);

@@ -28,7 +28,7 @@ function sizes({ model, asset }: Viewer): Row[] {
     ['Vertices', count(model.vertices)],
     ['Triangles', count(model.triangles)],
     ['File', `${bytes(asset.bytes)}, ${per.toFixed(1)} B per vertex`],
-    ['Harmonics', `order ${order}, ${order * order} × ${channels === 3 ? 'RGB' : 'grey'}`],
+    ['Harmonics', order > 0 ? `order ${order}, ${order * order} × ${channels === 3 ? 'RGB' : 'grey'}` : 'none: radiosity'],
     ['Numbers per vertex', `${channels * slots}${fixed ? ', lamps among them' : ''}`],
     ['Units', (units ?? '–').replace('^-1', '⁻¹').replace('^-2', '⁻²')],
   ];

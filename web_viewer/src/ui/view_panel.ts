@@ -28,6 +28,8 @@ export class ViewPanel {
 
   private light(): HTMLElement[] {
     const { controls, viewer } = this;
+    if (viewer.lights.order === 0)
+      return [h('p', {}, `${viewer.lights.choices[0].label}. Radiosity is the light of the bake and cannot be changed.`)];
     const picker = controls.select('light', 'Environment', () => viewer.lights.choices);
     viewer.onLights = picker.refill;
     const file = h('input', { type: 'file', id: 'environment-file', accept: '.hdr,.exr' });
@@ -44,6 +46,7 @@ export class ViewPanel {
 
   async useFile(file: File): Promise<void> {
     try {
+      if (this.viewer.lights.order === 0) throw new Error('Radiosity is the light of the bake and cannot be changed.');
       await this.viewer.useFile(file);
       toast(`${file.name} lights the scene`);
     } catch (error) {

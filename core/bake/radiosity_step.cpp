@@ -1,0 +1,259 @@
+#include "core/bake/radiosity_step.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+
+#include "core/bake/surface_samples.h"
+#include "core/bake/transport.h"
+#include "core/base/random.h"
+#include "core/mesh/topology.h"
+#include "core/meshless/direct_light.h"
+#include "core/prt/ray_origin.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+constexpr float kOpenConstantBand = 0.2820948F;  // what thresholds of the split measure are relative to (transport.cpp)
+
+/// What the qualities spend. The error that each is for was measured with core/meshless on the shared references.
+struct RadiosityEffort {
+  const char* reason;
+  std::uint64_t triangles;
+  float threshold;
+  DirectRays direct;
+  int rays;
+  float eps;
+  double points;  // times the automatic number
+};
+
+RadiosityEffort radiosity_effort(Quality quality) {
+  switch (quality) {
+    case Quality::draft:
+      return {"the draft quality", 10'000, 2e-4F, {{16, 64}, 64}, 128, 0.05F, 0.25};
+    case Quality::standard:
+      return {"the standard quality", 40'000, 5e-5F, {{32, 128}, 256}, 512, 0.02F, 1};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 160'000, 1e-5F, {{64, 512}, 1024}, 1024, 0.01F, 4};
+}
+
+Receiver receiver_at(const TransferPoint& p) { return {ray_origin(p), p.normal}; }
+
+std::vector<Vec3f> light_at(std::span<const TransferPoint> points, const DirectLight& light, std::uint64_t seed,
+                            std::uint64_t& rays, Threads& threads) {
+  std::vector<Vec3f> out(points.size());
+  if (light.none()) return out;
+  const std::vector<std::uint32_t> order = morton_order_of(points);
+  std::atomic<std::uint64_t> sent = 0;
+  threads.for_blocks(points.size(), 128, [&](std::size_t begin, std::size_t end) {
+    std::uint64_t own = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const TransferPoint& p = points[order[i]];
+      out[order[i]] = light.at(receiver_at(p), mix64(seed ^ point_key(p)), own);
+    }
+    sent += own;
+  });
+  rays += sent;
+  return out;
+}
+
+double mean_of(const std::vector<Vec3f>& values) {
+  double sum = 0;
+  for (const Vec3f& x : values) sum += double{x.x} + double{x.y} + double{x.z};
+  return values.empty() ? 0 : sum / (3 * static_cast<double>(values.size()));
+}
+
+std::vector<TransferPoint> some_vertices(const Mesh& mesh) {
+  const std::vector<TransferPoint> all = vertex_points(mesh);
+  std::vector<TransferPoint> some;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
+  return some;
+}
+
+void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
+  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
+}
+
+std::string short_text(double x) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%.3g", x);
+  return out;
+}
+
+bool has_lamps(const Scene& scene) {
+  if (!scene.lights.empty()) return true;
+  return std::any_of(scene.parts.begin(), scene.parts.end(), [&](const Part& part) {
+    return length(scene.materials[static_cast<std::size_t>(part.material)].emission) > 0;
+  });
+}
+
+/// Seconds and rays of direct light at one point, by a pilot over the surface.
+struct Pilot {
+  double seconds = 0, rays = 0;
+};
+
+Pilot pilot_direct(const Tracer& tracer, const Plan& plan, const Environment* sky, Threads& threads) {
+  const DirectLight light(tracer, sky, plan.radiosity->direct);
+  std::vector<TransferPoint> points;
+  for (const SurfaceSample& s : sample_surface(tracer.scene().mesh, 256, 0x70696c6f74)) {
+    const SurfacePoint p = surface_point(tracer.scene(), s.triangle, s.u, s.v);
+    points.push_back({p.position, p.normal, p.position, p.geometric_normal});
+  }
+  if (points.empty()) return {};
+  std::uint64_t rays = 0;
+  const auto start = std::chrono::steady_clock::now();
+  light_at(points, light, 1, rays, threads);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const auto n = static_cast<double>(points.size());
+  return {seconds / n, static_cast<double>(rays) / n};
+}
+
+/// A count of what may be beyond counting.
+std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
+
+void predict_radiosity(Plan& plan, const Scene& scene, const Pilot& pilot, double points) {
+  constexpr double kReflectedPrice = 3.4;  // of a gathering ray, as in forecast.cpp
+  const double input = static_cast<double>(scene.mesh.position.size());
+  const double triangles = static_cast<double>(plan.split ? plan.subdivide.triangles : scene.mesh.triangles.size());
+  const double vertices = plan.split ? std::max(input, 0.55 * triangles) : input;
+  const double asked = plan.split ? vertices + 1.5 * triangles + triangles / kRoughRays : vertices;
+  const double direct = asked * pilot.rays + points * pilot.rays / 4;
+  const double gathered = points * plan.radiosity->rays;
+  const double price = pilot.rays > 0 ? pilot.seconds / pilot.rays : 0;
+  double pixels = 0, files = 0;
+  for (const Image& image : scene.images) {
+    pixels += static_cast<double>(image.rgba.size());
+    files += static_cast<double>(image.encoded.size());
+  }
+  Prediction& out = plan.prediction;
+  out.triangles = static_cast<std::uint64_t>(triangles);
+  out.vertices = static_cast<std::uint64_t>(vertices);
+  out.rays = whole(direct + gathered);
+  out.seconds = 0.2 + price * (direct + kReflectedPrice * gathered) + 1.4e-5 * triangles + 6e-6 * vertices;
+  out.memory_bytes =
+      whole(24e6 + 700 * vertices + points * (300 + 12.0 * plan.radiosity->rays) + 2 * pixels + 2 * files);
+  out.artifact_bytes = static_cast<std::uint64_t>(2000 + 2500.0 * static_cast<double>(scene.parts.size()) + files +
+                                                  4.5 * (vertices + input) + 5 * vertices);
+}
+
+}  // namespace
+
+Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality quality, const Environment* sky,
+                         Threads& threads) {
+  const RadiosityEffort effort = radiosity_effort(quality);
+  Plan plan;
+  plan.order = 0;
+  plan.raw_bits = 16;
+  plan.encoding.form = PrtStep::Encoding::Form::raw;
+  plan.lamps = has_lamps(scene);
+  plan.radiosity.emplace();
+  Radiosity& r = *plan.radiosity;
+  r.direct = effort.direct;
+  r.rays = step.rays.value_or(effort.rays);
+  r.eps = static_cast<float>(step.eps_irradiance.value_or(effort.eps));
+  r.bounces = step.bounces.value_or(-1);
+  r.points.levels = step.levels.value_or(0);
+  if (step.radius) r.points.radius = static_cast<float>(std::max(*step.radius / scene.frame.scale, 1e-30));
+  r.points.wanted = resolve({}, scene).wanted;
+  r.points.wanted = static_cast<std::uint64_t>(effort.points * static_cast<double>(r.points.wanted));
+  r.points = resolve(r.points, scene);
+  const double finest = std::ldexp(double{r.points.radius}, 1 - r.points.levels);
+  const double points = expected_points(surface_area(scene.mesh), finest);
+
+  const std::string asked = "asked for by the recipe";
+  decide(plan, "light", sky == nullptr ? "lamps" : sky->name,
+         plan.lamps ? "the scene has emitters or punctual lights of its own" : "the scene has no light of its own");
+  decide(plan, "scheme", "rows", "the transport operator is traced once; bounces are sparse sweeps");
+  decide(plan, "points", "about " + short_text(points) + " on " + std::to_string(r.points.levels) + " levels",
+         step.radius
+             ? asked
+             : effort.reason + std::string(" takes radii from ") + short_text(r.points.radius * scene.frame.scale) +
+                   " to " + short_text(finest * scene.frame.scale) + " m for this surface and its vertices");
+  decide(plan, "rays", std::to_string(r.rays), step.rays ? asked : effort.reason);
+  decide(plan, "eps_irradiance", short_text(double{r.eps}), step.eps_irradiance ? asked : effort.reason);
+  decide(plan, "bounces", r.bounces < 0 ? "auto" : std::to_string(r.bounces),
+         r.bounces < 0 ? "until a ten-thousandth of the light is left" : asked);
+
+  using Mode = PrtStep::Subdivision::Mode;
+  const std::uint64_t input = scene.mesh.triangles.size();
+  const std::uint64_t budget = step.subdivide.triangles.value_or(input + effort.triangles);
+  plan.split = step.subdivide.mode != Mode::off && budget > input;
+  plan.subdivide = {.measure = step.subdivide.measure,
+                    .alpha = step.subdivide.alpha,
+                    .threshold = step.subdivide.threshold.value_or(effort.threshold),
+                    .triangles = budget,
+                    .max_depth = step.subdivide.max_depth};
+  decide(plan, "subdivide", plan.split ? "up to " + std::to_string(budget) + " triangles" : "no",
+         step.subdivide.mode == Mode::off ? "turned off by the recipe"
+         : step.subdivide.triangles       ? asked
+                                          : effort.reason + std::string(" adds triangles where direct light changes"));
+  const Tracer tracer(scene, threads);
+  predict_radiosity(plan, scene, pilot_direct(tracer, plan, sky, threads), points);
+  return plan;
+}
+
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, BakeLog& log, Threads& threads) {
+  Radiosity params = *plan.radiosity;
+  log.begin("direct", 0.55);
+  {
+    const Tracer tracer(scene, threads);
+    const DirectLight light(tracer, sky, params.direct), rough(tracer, sky, params.direct.rough());
+    std::uint64_t rays = 0, points = 0;
+    const std::uint64_t expected =
+        std::max<std::uint64_t>(1, plan.split ? 3 * plan.subdivide.triangles : scene.mesh.position.size());
+    const double mean = mean_of(light_at(some_vertices(scene.mesh), rough, params.seed, rays, threads));
+    const float scale = mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
+    const auto columns = [&](std::span<const TransferPoint> batch, const DirectLight& from) {
+      std::vector<float> out;
+      for (const Vec3f& x : light_at(batch, from, params.seed, rays, threads)) {
+        out.insert(out.end(), {x.x * scale, x.y * scale, x.z * scale});
+      }
+      points += batch.size();
+      log.advance(std::min(points, expected), expected);
+      return out;
+    };
+    const ValueSource source{.width = 3,
+                             .values = [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
+                             .bounded = {0, 1, 2},
+                             .hidden = hidden_test(tracer),
+                             .pierced = pierce_test(tracer),
+                             .rough = [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
+    const Mesh base = plan.split && params.bounces != 0 ? refine_base(scene.mesh, plan, threads) : scene.mesh;
+    Subdivide split = plan.subdivide;
+    if (!plan.split) split = {.triangles = 0};
+    Subdivided fine = subdivide(base, source, split, threads);
+    params.stand_ins = std::move(fine.stand_ins);
+    params.known_direct.resize(fine.mesh.position.size());
+    for (std::size_t v = 0; v < params.known_direct.size(); ++v) {
+      const float* x = &fine.values[3 * v];
+      params.known_direct[v] = Vec3f{std::max(0.0F, x[0]), std::max(0.0F, x[1]), std::max(0.0F, x[2])} / scale;
+    }
+    scene.mesh = std::move(fine.mesh);
+    log.count_rays(rays);
+  }
+
+  log.begin("bounces", 0.85);
+  const Tracer tracer(scene, threads);
+  const RadiosityResult r = solve_radiosity(tracer, sky, params, threads);
+  log.count_rays(r.stats.direct_rays + r.stats.gather_rays);
+  std::uint64_t gathered = 0, placed = 0;
+  for (const std::uint32_t n : r.stats.gathered) gathered += n;
+  for (const std::uint32_t n : r.stats.points) placed += n;
+  decide(plan, "gathered", std::to_string(gathered) + " of " + std::to_string(placed) + " points",
+         "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
+             " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
+
+  Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
+  out.coefficients.reserve(3 * r.direct.size());
+  for (std::size_t v = 0; v < r.direct.size(); ++v) {
+    const Vec3f x = r.direct[v] + r.indirect[v];
+    out.coefficients.insert(out.coefficients.end(), {x.x, x.y, x.z});
+  }
+  return out;
+}
+
+}  // namespace kiln

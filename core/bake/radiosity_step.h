@@ -1,0 +1,24 @@
+#pragma once
+// The `radiosity` step: light of one job at the vertices, all reflections (core/meshless/radiosity.h).
+// The mesh is refined where direct light changes, as for `prt`; then reflected light is solved on points.
+// Result  a Transfer of order 0 whose only slot is that light.
+
+#include <cstdint>
+
+#include "core/bake/bake_log.h"
+#include "core/bake/plan.h"
+#include "core/base/threads.h"
+#include "core/prt/transfer.h"
+#include "core/scene/environment.h"
+#include "core/scene/scene.h"
+
+namespace kiln {
+
+/// What will be done and what it will cost. `sky` is the job's environment, or null. Seconds come from a pilot of
+/// direct light; reflected rays are priced as in forecast.h.
+Plan make_radiosity_plan(const Scene&, const RadiosityStep&, Quality, const Environment* sky, Threads&);
+
+/// Refines scene.mesh as planned and solves for the light at its vertices. Adds to plan.decisions what it found.
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, BakeLog&, Threads&);
+
+}  // namespace kiln

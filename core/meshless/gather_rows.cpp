@@ -1,0 +1,161 @@
+#include "core/meshless/gather_rows.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "core/base/random.h"
+#include "core/mesh/topology.h"
+#include "core/prt/ray_origin.h"
+#include "core/sphere/sampling.h"
+
+namespace kiln {
+namespace {
+
+constexpr int kSets = 8;
+constexpr float kGrazing = 0.1F;  // cosine below which a ray's share in (2) grows no more
+
+std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(std::clamp(x, 0.0F, 1.0F) * 65535)); }
+
+}  // namespace
+
+GatherRows::GatherRows(const World& world, int rays, std::uint64_t seed)
+    : world_(world), sets_(0, rays, kSets, mix64(seed), kFirstRays), seed_(seed) {}
+
+void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threads& threads, std::uint64_t& rays) {
+  const std::size_t first_row = row_.size(), first_chunk = chunks_.size();
+  row_.resize(first_row + points.size());
+  chunks_.resize(first_chunk + (points.size() + kChunk - 1) / kChunk);
+  std::atomic<std::uint64_t> sent = 0;
+  threads.for_blocks(points.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    const std::size_t chunk = first_chunk + begin / kChunk;
+    std::vector<RowEntry>& entries = chunks_[chunk];
+    entries.reserve((end - begin) * static_cast<std::size_t>(sets_.samples()));
+    for (std::size_t i = begin; i < end; ++i) {
+      Row& row = row_[first_row + i];
+      row.chunk = static_cast<std::uint32_t>(chunk);
+      row.first = static_cast<std::uint32_t>(entries.size());
+      Work work{entries, row, Random(seed_, point_key(points[i]), 1), 0, enclosed};
+      trace(points[i], work);
+      row.count = static_cast<std::uint32_t>(entries.size()) - row.first;
+      sent += work.rays;
+    }
+    entries.shrink_to_fit();
+  });
+  rays += sent;
+}
+
+void GatherRows::trace(const TransferPoint& point, Work& work) const {
+  const LocalFrame frame = local_frame(sets_, point.normal, seed_, point_key(point));
+  const Vec3f origin = ray_origin(point);
+  Rays16 rays;
+  Hits16 hits;
+  rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
+  const std::size_t before = work.entries.size();
+  for (int packet = 0; packet < sets_.samples() / kPacket; ++packet) {
+    if (work.enclosed && packet * kPacket == kFirstRays && work.entries.size() == before &&
+        work.row.constant == Vec3f{}) {
+      break;
+    }
+    sets_.turn(frame.set, packet, frame.basis, rays);
+    world_.tracer.closest16(rays, hits);
+    work.rays += kPacket;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (hits.triangle[i] == kNoHit) continue;
+      Path path{{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false}, {rays.dx[i], rays.dy[i], rays.dz[i]}};
+      const std::uint32_t sender = follow(path, work);
+      if (sender == Senders::kNone) continue;
+      const Vec3f& t = path.throughput;
+      const auto ray = static_cast<std::uint16_t>(static_cast<std::size_t>(packet * kPacket) + i);
+      work.entries.push_back({sender, {to_fixed(t.x), to_fixed(t.y), to_fixed(t.z)}, ray});
+    }
+  }
+  work.row.constant = work.row.constant / static_cast<float>(sets_.samples());
+}
+
+/// From a hit to the first sender, or kNone where the path ends without one.
+std::uint32_t GatherRows::follow(Path& path, Work& work) const {
+  const Mesh& mesh = world_.tracer.scene().mesh;
+  for (;;) {
+    const Hit& hit = path.hit;
+    const HitSide side = world_.faces.side(hit.triangle, path.direction);
+    if (side == HitSide::dark) return Senders::kNone;
+    if (world_.faces.is_plain(hit.triangle)) {
+      path.throughput = path.throughput * world_.faces.plain(mesh.part[hit.triangle]);
+    } else {
+      const auto draw = static_cast<std::uint32_t>(work.random.next());
+      path.throughput = path.throughput * world_.albedo.read(world_.albedo.tap(hit.triangle, hit.u, hit.v, draw));
+    }
+    const float most = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
+    if (!(most > 0)) return Senders::kNone;
+    std::uint32_t sender = Senders::kNone;
+    if (side == HitSide::front) sender = world_.senders.at(hit.triangle, hit.u, hit.v);
+    if (sender != Senders::kNone && !work.enclosed) return sender;
+
+    const Triangle& t = mesh.triangles[hit.triangle];
+    Vec3f up = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
+    if (dot(up, path.direction) > 0) up = -up;
+    const Vec3f place =
+        mesh.position[t[0]] * (1 - hit.u - hit.v) + mesh.position[t[1]] * hit.u + mesh.position[t[2]] * hit.v;
+    const Vec3f origin = offset_origin(place, up);
+    if (sender != Senders::kNone && sees(sender, origin)) return sender;
+
+    // No sender stands for this place: light it, and go on in a random direction while the throughput lasts.
+    work.row.constant += path.throughput * world_.light.at({origin, up}, work.random.next(), work.rays);
+    const float alive = std::min(1.0F, most);
+    if (work.random.uniform() >= alive) return Senders::kNone;
+    path.throughput = path.throughput / alive;
+    const float x = work.random.uniform(), y = work.random.uniform();
+    path.direction = normalized(basis_around(up).to_world(cosine_hemisphere(Vec2f{x, y})), up);
+    path.hit = world_.tracer.closest(origin, path.direction, kFar);
+    ++work.rays;
+    if (!path.hit) return Senders::kNone;
+  }
+}
+
+/// Whether nothing stands between a place and its sender.
+bool GatherRows::sees(std::uint32_t sender, const Vec3f& origin) const {
+  const Vec3f way = world_.senders.origin(sender) - origin;
+  const float distance = length(way);
+  return !(distance > 0) || !world_.tracer.occluded(origin, way / distance, distance);
+}
+
+Vec3f GatherRows::apply(std::size_t index, std::span<const Vec3f> senders) const {
+  constexpr float kUnit = 1.0F / 65535;
+  const Row& row = row_[index];
+  const RowEntry* entry = chunks_[row.chunk].data() + row.first;
+  Vec3f sum;
+  for (std::uint32_t k = 0; k < row.count; ++k) {
+    const Vec3f& x = senders[entry[k].sender];
+    sum.x += static_cast<float>(entry[k].albedo[0]) * x.x;
+    sum.y += static_cast<float>(entry[k].albedo[1]) * x.y;
+    sum.z += static_cast<float>(entry[k].albedo[2]) * x.z;
+  }
+  return row.constant + sum * (kUnit / static_cast<float>(sets_.samples()));
+}
+
+VectorValue GatherRows::apply_vector(std::size_t index, const TransferPoint& point,
+                                     std::span<const Vec3f> senders) const {
+  const Row& row = row_[index];
+  const LocalFrame frame = local_frame(sets_, point.normal, seed_, point_key(point));
+  const float unit = 1.0F / 65535 / static_cast<float>(sets_.samples());
+  VectorValue out{row.constant, {}};
+  Rays16 rays;
+  int packet = -1;
+  for (std::uint32_t k = 0; k < row.count; ++k) {
+    const RowEntry& entry = chunks_[row.chunk][row.first + k];
+    if (entry.ray / kPacket != packet) sets_.turn(frame.set, packet = entry.ray / kPacket, frame.basis, rays);
+    const std::size_t lane = entry.ray % kPacket;
+    const Vec3f w{rays.dx[lane], rays.dy[lane], rays.dz[lane]};
+    const float cosine = dot(w, point.normal);
+    const Vec3f aside = (w - point.normal * cosine) / std::max(cosine, kGrazing);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float light = static_cast<float>(entry.albedo[c]) * unit * senders[entry.sender][c];
+      out.value[c] += light;
+      out.turn[c] += aside * light;
+    }
+  }
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,6 @@
+if(TARGET kiln_reference_set)
+  add_executable(kiln_radiosity radiosity.cpp)
+  kiln_flags(kiln_radiosity)
+  target_link_libraries(kiln_radiosity PRIVATE kiln_meshless kiln_prt kiln_reference_set)
+  target_compile_definitions(kiln_radiosity PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
+endif()

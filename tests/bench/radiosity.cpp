@@ -1,0 +1,195 @@
+// Radiosity at vertices: relRMSE against the shared references for processor seconds. One JSON line a run: the
+// meshless rows, core/prt's vertices (direct light of lamps, then its Neumann series), and the plain path estimator.
+//   kiln_radiosity [scene: cornell | bunny | all] [repeats] [method: rows | vertices | paths | all]
+
+#include "core/meshless/radiosity.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "core/prt/interreflection.h"
+#include "core/prt/ray_origin.h"
+#include "core/sphere/sh.h"
+#include "core/trace/reference.h"
+#include "tests/bench/bench.h"
+#include "tests/core/prt/reference_set.h"
+
+namespace kiln::bench {
+namespace {
+
+struct Case {
+  std::string name, reference;
+  testing::ReferenceSet set;
+  std::optional<Environment> sky;
+  std::vector<Vec3f> truth, direct;
+};
+
+/// Processor seconds by stage of the last run, and of all runs in all.
+struct Clock {
+  std::map<std::string, double> stages;
+  std::string now;
+  double since = process_seconds(), start = process_seconds();
+  void begin(std::string_view name) {
+    const double t = process_seconds();
+    if (!now.empty()) stages[now] += t - since;
+    now = name, since = t;
+  }
+};
+
+void print(const Case& c, const std::string& method, const std::string& knobs, std::vector<double> seconds,
+           const std::vector<Vec3f>& values, const std::string& more = "") {
+  std::vector<Vec3f> compared;
+  for (const std::uint32_t v : c.set.vertex) compared.push_back(values[v]);
+  const testing::RelativeError error = testing::relative_error(compared, c.truth);
+  std::printf(
+      "{\"bench\":\"radiosity\",\"scene\":\"%s\",\"method\":\"%s\",\"knobs\":\"%s\",\"cpu_s\":%.3f,"
+      "\"relrmse\":%.5f,\"without_worst_1pct\":%.5f%s}\n",
+      c.name.c_str(), method.c_str(), knobs.c_str(), median(std::move(seconds)), error.all, error.without_worst,
+      more.c_str());
+  std::fflush(stdout);
+}
+
+/// relRMSE, and without the worst 1 %, of values at vertices.
+std::string error_text(const Case& c, const std::vector<Vec3f>& values, const std::vector<Vec3f>& truth) {
+  std::vector<Vec3f> compared;
+  for (const std::uint32_t v : c.set.vertex) compared.push_back(values[v]);
+  const testing::RelativeError error = testing::relative_error(compared, truth);
+  char text[64];
+  std::snprintf(text, sizeof text, "[%.5f,%.5f]", error.all, error.without_worst);
+  return text;
+}
+
+std::string list(const std::vector<std::uint32_t>& numbers) {
+  std::string text = "[";
+  for (const std::uint32_t n : numbers) text += (text.size() > 1 ? "," : "") + std::to_string(n);
+  return text + "]";
+}
+
+void run_rows(const Case& c, const std::string& knobs, const Radiosity& params, int repeats, Threads& threads) {
+  std::vector<double> seconds;
+  std::vector<Vec3f> values;
+  std::string more;
+  for (int i = 0; i < repeats; ++i) {
+    Clock clock;
+    const Tracer tracer(c.set.scene, threads);
+    Radiosity own = params;
+    own.stage = [&](std::string_view name) { clock.begin(name); };
+    RadiosityResult r = solve_radiosity(tracer, c.sky ? &*c.sky : nullptr, own, threads);
+    clock.begin("end");
+    seconds.push_back(process_seconds() - clock.start);
+    more = ",\"direct\":" + error_text(c, r.direct, c.direct);
+    values = std::move(r.direct);
+    for (std::size_t v = 0; v < values.size(); ++v) values[v] += r.indirect[v];
+    more += ",\"points\":" + list(r.stats.points) + ",\"gathered\":" + list(r.stats.gathered) +
+            ",\"alone\":" + std::to_string(r.stats.alone) + ",\"sweeps\":" + std::to_string(r.stats.sweeps) +
+            ",\"direct_rays\":" + std::to_string(r.stats.direct_rays) +
+            ",\"gather_rays\":" + std::to_string(r.stats.gather_rays);
+    for (const auto& [name, s] : clock.stages) {
+      char text[64];
+      std::snprintf(text, sizeof text, ",\"%s_s\":%.3f", name.c_str(), s);
+      more += text;
+    }
+  }
+  print(c, "rows", knobs, seconds, values, more);
+}
+
+void run_vertices(const Case& c, int lamp_samples, int bounce_samples, int repeats, Threads& threads) {
+  std::vector<double> seconds;
+  std::vector<Vec3f> values;
+  const std::vector<Vec3f> light = c.sky ? project_environment(*c.sky, 1) : std::vector<Vec3f>(1, Vec3f{});
+  for (int i = 0; i < repeats; ++i) {
+    const double start = process_seconds();
+    const Tracer tracer(c.set.scene, threads);
+    const std::vector<TransferPoint> points = vertex_points(c.set.scene.mesh);
+    std::vector<float> direct(points.size(), 0.0F);
+    std::vector<Vec3f> fixed;
+    if (c.sky) {
+      direct = bake_direct_transfer(tracer, points, {.order = 1, .samples = lamp_samples}, threads);
+    } else {
+      fixed = bake_fixed_direct(tracer, points, {.samples = lamp_samples}, threads);
+    }
+    const Interreflection params{.order = 1, .bounces = c.sky ? 5 : 10, .samples = bounce_samples};
+    const Transfer t =
+        bake_interreflection(tracer, c.set.scene.mesh, std::move(direct), std::move(fixed), params, threads);
+    seconds.push_back(process_seconds() - start);
+    values.assign(points.size(), {});
+    for (std::size_t v = 0; v < points.size(); ++v) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float* row = t.at(v, static_cast<int>(k));
+        values[v][k] = row[0] * light[0][k] + (t.fixed ? row[t.slots() - 1] : 0.0F);
+      }
+    }
+  }
+  print(c, "vertices", "lamp " + std::to_string(lamp_samples) + " bounce " + std::to_string(bounce_samples), seconds,
+        values);
+}
+
+void run_paths(const Case& c, int samples, Threads& threads) {
+  const double start = process_seconds();
+  const Tracer tracer(c.set.scene, threads);
+  const std::vector<TransferPoint> points = vertex_points(c.set.scene.mesh);
+  std::vector<ReferencePoint> places;
+  for (const std::uint32_t v : c.set.vertex) {
+    const TransferPoint& p = points[v];
+    // The estimator lifts its rays itself; the hair inside the face is what keeps a vertex from looking through a wall.
+    places.push_back({ray_origin(p), p.normal, p.face_normal});
+  }
+  ReferenceLight light;
+  if (c.sky) light.environments = {*c.sky};
+  light.scene_lights = !c.sky;
+  const ReferenceResult r = trace_reference(tracer, places, light, {.samples = samples}, threads);
+  const double seconds = process_seconds() - start;
+  std::vector<Vec3f> values(points.size());
+  for (std::size_t i = 0; i < c.set.vertex.size(); ++i) values[c.set.vertex[i]] = to_float(r.value[i]);
+  print(c, "paths", "samples " + std::to_string(samples), {seconds}, values);
+}
+
+std::vector<Case> load(const std::string& only) {
+  std::vector<Case> out;
+  for (const std::string name : {"cornell", "bunny"}) {
+    if (only != "all" && only != name) continue;
+    auto set = testing::load_reference_set(KILN_SHARED, name);
+    if (!set) {
+      std::fprintf(stderr, "%s is not there\n", name.c_str());
+      continue;
+    }
+    std::vector<Vec3f> truth = set->values(name + ".comb"), direct = set->values(name + ".dir");
+    std::optional<Environment> sky;
+    if (name == "bunny") sky = constant_sky({1, 1, 1});
+    out.push_back({name, name + ".comb", std::move(*set), sky, std::move(truth), std::move(direct)});
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace kiln::bench
+
+int main(int argc, char** argv) {
+  using namespace kiln;
+  using namespace kiln::bench;
+  const std::string scene = argc > 1 ? argv[1] : "all", method = argc > 3 ? argv[3] : "all";
+  const int repeats = argc > 2 ? std::max(1, std::atoi(argv[2])) : 1;
+  Threads threads(2);
+  for (const Case& c : load(scene)) {
+    if (method == "rows" || method == "all") {
+      const LampRays few{16, 64}, many{64, 512};
+      const auto rows = [&](const std::string& knobs, const Radiosity& r) { run_rows(c, knobs, r, repeats, threads); };
+      rows("draft", {.points = {.wanted = 4096}, .direct = {few, 64}, .rays = 128, .eps = 0.05F});
+      rows("256 rays, eps .05", {.rays = 256, .eps = 0.05F});
+      rows("default", {});
+      rows("scalar", {.vector = false});
+      rows("all gathered", {.uniform_levels = 5});
+      rows("final", {.points = {.wanted = 60000}, .direct = {many, 1024}, .rays = 1024, .eps = 0.01F});
+    }
+    if (method == "vertices" || method == "all") {
+      run_vertices(c, 64, 64, repeats, threads);
+      run_vertices(c, 256, 256, repeats, threads);
+    }
+    if (method == "paths" || method == "all") {
+      run_paths(c, 16, threads);
+      run_paths(c, 64, threads);
+    }
+  }
+}
