@@ -78,12 +78,21 @@ json rgb_json(const Vec3d& v) {
 }
 
 json point_json(const QueryPoint& point) {
-  return {{"position", {point.position.x, point.position.y, point.position.z}},
-          {"normal", {point.normal.x, point.normal.y, point.normal.z}}};
+  json out = {{"position", {point.position.x, point.position.y, point.position.z}},
+              {"normal", {point.normal.x, point.normal.y, point.normal.z}}};
+  if (point.view) out["view"] = {point.view->x, point.view->y, point.view->z};
+  return out;
 }
 
-std::string names_line(bool errors) {
-  std::string line = "x,y,z,nx,ny,nz";
+/// A file has views for all of its points or for none.
+bool have_views(const std::vector<QueryPoint>& points) { return !points.empty() && points[0].view; }
+
+std::string point_names(const std::vector<QueryPoint>& points) {
+  return have_views(points) ? "x,y,z,nx,ny,nz,vx,vy,vz" : "x,y,z,nx,ny,nz";
+}
+
+std::string names_line(const std::vector<QueryPoint>& points, bool errors) {
+  std::string line = point_names(points);
   const auto add = [&](const std::string& name) {
     for (const auto& channel : channel_names(name)) line += "," + channel;
   };
@@ -106,10 +115,11 @@ Outcome<std::vector<QueryPoint>> read_points(const std::string& path) {
 }
 
 std::string points_csv(const std::vector<QueryPoint>& points) {
-  std::string out = "x,y,z,nx,ny,nz\n";
+  std::string out = point_names(points) + "\n";
   for (const QueryPoint& point : points) {
     append(out, point.position);
     append_value(out, point.normal);
+    if (point.view) append_value(out, *point.view);
     out += '\n';
   }
   return out;
@@ -148,11 +158,12 @@ Outcome<ValueTable> read_values(const std::string& path) {
 }
 
 std::string values_csv(const ValueTable& table) {
-  std::string out = names_line(table.has_errors);
+  std::string out = names_line(table.points, table.has_errors);
   for (std::size_t i = 0; i < table.points.size(); ++i) {
     const LightValue& value = table.values[i];
     append(out, table.points[i].position);
     append(out, table.points[i].normal);
+    if (table.points[i].view) append(out, *table.points[i].view);
     append_value(out, value.irradiance);
     append_value(out, value.radiance);
     out += "," + number_text(static_cast<float>(value.distance));

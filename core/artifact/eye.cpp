@@ -7,8 +7,6 @@
 namespace kiln {
 namespace {
 
-constexpr double kDielectric = 0.04;
-
 /// Light that arrives at a point of a triangle.
 void arriving_at(const GlossyTransfer& glossy, const LitComponents& lit, const TrianglePoint& place, Vec3d* out) {
   const std::array<double, 3> weight{1 - double{place.u} - place.v, place.u, place.v};
@@ -40,8 +38,7 @@ EyeRadiance eye_radiance(const BakedScene& baked, const EyeLight& light, const E
   std::array<Vec3d, sh_count(kMaxLobeOrder)> arriving;
   arriving_at(baked.glossy, light.lit, point.place, arriving.data());
   const Lobe lobe = lobe_at(baked.lobes, dot(point.normal, point.view), material.roughness);
-  const double kept = kDielectric * lobe.a + lobe.b;
-  return {material.diffuse * value * (1 - kept),
+  return {material.diffuse * value * (1 - lobe.kept()),
           lobe.albedo(material.f0) * reflected_light(lobe, point.normal, point.view, arriving.data())};
 }
 

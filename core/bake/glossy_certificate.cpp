@@ -29,13 +29,6 @@ struct Eyes {
   std::vector<Vec3d> diffuse;         // reflectance there, below the specular layer
 };
 
-/// Even over the half space of n.
-Vec3d random_view(const Vec3d& n, Random& random) {
-  const double z = 1 - random.uniform_double(), phi = 2 * std::numbers::pi * random.uniform_double();
-  const double r = std::sqrt(1 - z * z);
-  return normalized(basis_around(n).to_world({r * std::cos(phi), r * std::sin(phi), z}));
-}
-
 EyedPoint eyed_point(const Scene& scene, const SurfaceMatch& match, const Vec3d& view, const EyeMaterial& material) {
   Vec3f face = area_vector(scene.mesh, scene.mesh.triangles[match.triangle]);
   const Vec3f normal = to_float(match_normal(scene.mesh, match));
@@ -70,7 +63,7 @@ Eyes open_eyes(const BakedScene& baked, const Scene& input, std::uint64_t seed) 
     out.truth.push_back(eyed_point(input, *match, view, material));
     out.below.push_back(out.truth.back().at);
     const Lobe lobe = lobe_at(baked.lobes, dot(there, view), material.roughness);
-    out.diffuse.push_back(material.diffuse * (1 - kDielectricF0 * lobe.a - lobe.b));
+    out.diffuse.push_back(material.diffuse * (1 - lobe.kept()));
   }
   return out;
 }

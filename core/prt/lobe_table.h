@@ -50,6 +50,8 @@ struct Lobe {
 
   /// Directional albedo for reflectance F0 at normal incidence.
   Vec3d albedo(const Vec3d& f0) const { return f0 * a + Vec3d{b, b, b}; }
+  /// That of F0 = .04: what the specular layer keeps from the diffuse one below it.
+  double kept() const { return 0.04 * a + b; }
 };
 Lobe lobe_at(const LobeTable&, double nv, double roughness);
 
