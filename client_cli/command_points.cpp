@@ -18,7 +18,8 @@ Outcome<Surface> surface_of(const PointsOptions& options) {
   KILN_TRY(bytes, read_file(options.input));
   if (kind_of(bytes) != FileKind::artefact) {
     if (options.specular)
-      return fail(ExitCode::usage, "not_an_artefact", "is no artefact: --specular asks for its matrices", options.input);
+      return fail(ExitCode::usage, "not_an_artefact", "is no artefact: --specular asks for its matrices",
+                  options.input);
     KILN_TRY(scene, load_scene(options.input));
     return Surface{std::move(scene), {}};
   }

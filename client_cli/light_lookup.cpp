@@ -124,8 +124,8 @@ SeenPoints seen_points(const Scene& scene, const Places& places, const LookupOpt
     const double nv = dot(match_normal(scene.mesh, *places[i]), towards);
     const double kept = lobe_at(*lobes, nv, material.roughness).kept();
     out.index.push_back(i);
-    out.eyed.push_back({reference_point(scene, *places[i]), to_float(towards), ggx_alpha(material.roughness),
-                        material.f0});
+    out.eyed.push_back(
+        {reference_point(scene, *places[i]), to_float(towards), ggx_alpha(material.roughness), material.f0});
     out.diffuse.push_back(material.diffuse * (1 - kept));
   }
   return out;
@@ -172,10 +172,9 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
     const Vec3d* view = view_of(options, out.size() - 1);
     if (!view) continue;
     const SurfacePoint surface = surface_at(baked.scene, *place);
-    const EyeRadiance radiance =
-        eye_radiance(baked, seen,
-                     {point, match_normal(baked.scene.mesh, *place), normalized(*view),
-                      eye_material(baked.scene, surface)});
+    const EyeRadiance radiance = eye_radiance(
+        baked, seen,
+        {point, match_normal(baked.scene.mesh, *place), normalized(*view), eye_material(baked.scene, surface)});
     out.back().radiance = radiance.diffuse + radiance.specular + to_double(emission_at(baked.scene, surface));
   }
   return out;

@@ -21,7 +21,8 @@ using Places = std::vector<std::optional<SurfaceMatch>>;
 
 Places place_points(const Scene&, std::span<const QueryPoint>, Threads&);
 
-/// irradiance = pi * value; radiance = value, or albedo * value + emission where `scene_albedo`. Towards a point's own eye
+/// irradiance = pi * value; radiance = value, or albedo * value + emission where `scene_albedo`. Towards a point's own
+/// eye
 /// (`points`, where it has one) that is instead
 ///   (1 - metallic) albedo (1 - E) value + specular + emission                                                     (1)
 /// as core/artifact/eye.h says; of an artefact only where it has matrices, as everything else in it is diffuse.

@@ -25,8 +25,10 @@ constexpr std::size_t kPoints = 1024;
 struct Eyes {
   std::vector<EyePoint> shown;
   std::vector<EyedPoint> truth;
-  std::vector<ReferencePoint> below;  // the places of `truth`
-  std::vector<Vec3d> diffuse;         // reflectance there, below the specular layer
+  std::vector<ReferencePoint> below;        // the places of `truth`
+  std::vector<Vec3d> diffuse;               // reflectance there, below the specular layer
+  std::vector<Vec3d> albedo;                // of that layer: F0 a + b
+  std::vector<std::vector<double>> kernel;  // the lobe in the bands of the matrices
 };
 
 EyedPoint eyed_point(const Scene& scene, const SurfaceMatch& match, const Vec3d& view, const EyeMaterial& material) {
@@ -64,6 +66,9 @@ Eyes open_eyes(const BakedScene& baked, const Scene& input, std::uint64_t seed) 
     out.below.push_back(out.truth.back().at);
     const Lobe lobe = lobe_at(baked.lobes, dot(there, view), material.roughness);
     out.diffuse.push_back(material.diffuse * (1 - lobe.kept()));
+    out.albedo.push_back(lobe.albedo(material.f0));
+    const LobeKernel kernel = lobe_kernel(lobe, there, view);
+    out.kernel.emplace_back(kernel.begin(), kernel.begin() + sh_count(lobe.order));
   }
   return out;
 }
@@ -90,13 +95,28 @@ struct Values {
   }
 };
 
-/// Everything about one run of the reference: of each lighting radiance and specular part, and the job's own light.
-struct Judged {
-  Values radiance, specular, job;
+/// What the reference says of the eyes.
+struct Truths {
+  ReferenceResult diffuse;   // of white Lambertian points
+  ReferenceResult specular;  // of lobes
+  ReferenceResult bands;     // of lobes in the bands of the matrices
 };
 
-Judged look(const BakedScene& baked, const Eyes& eyes, const ReferenceLight& light, const ReferenceResult& diffuse,
-            const ReferenceResult& specular) {
+/// Adds one value of the reference and its halves: `below` of what is diffuse and `above` of what is specular.
+void add_truth(Values& out, const Vec3d& below, const ReferenceResult& diffuse, const Vec3d& above,
+               const ReferenceResult& specular, std::size_t i) {
+  out.truth.push_back(below * diffuse.value[i] + above * specular.value[i]);
+  out.half_a.push_back(below * diffuse.half_a[i] + above * specular.half_a[i]);
+  out.half_b.push_back(below * diffuse.half_b[i] + above * specular.half_b[i]);
+}
+
+/// Everything about one run of the reference: of each lighting radiance and specular part, and the job's own light.
+struct Judged {
+  Values radiance, specular, transport, truncation, job;
+};
+
+Judged look(const BakedScene& baked, const Eyes& eyes, const ReferenceLight& light, const Truths& truths) {
+  const ReferenceResult &diffuse = truths.diffuse, &specular = truths.specular;
   const std::size_t points = eyes.truth.size(), skipped = light.environments.size();
   const std::size_t all = points == 0 ? 0 : diffuse.value.size() / points;
   Judged out;
@@ -104,14 +124,19 @@ Judged look(const BakedScene& baked, const Eyes& eyes, const ReferenceLight& lig
     for (std::size_t p = 0; p < points; ++p) {
       const std::size_t i = k * points + p;
       const EyeRadiance shown = eye_radiance(baked, own, eyes.shown[p]);
-      out.radiance.shown.push_back(shown.diffuse + shown.specular);
-      out.radiance.truth.push_back(eyes.diffuse[p] * diffuse.value[i] + specular.value[i]);
-      out.radiance.half_a.push_back(eyes.diffuse[p] * diffuse.half_a[i] + specular.half_a[i]);
-      out.radiance.half_b.push_back(eyes.diffuse[p] * diffuse.half_b[i] + specular.half_b[i]);
+      const Vec3d &below = eyes.diffuse[p], one{1, 1, 1};
+      for (Values* values : {&out.radiance, &out.transport}) values->shown.push_back(shown.diffuse + shown.specular);
       out.specular.shown.push_back(shown.specular);
-      out.specular.truth.push_back(specular.value[i]);
-      out.specular.half_a.push_back(specular.half_a[i]);
-      out.specular.half_b.push_back(specular.half_b[i]);
+      add_truth(out.radiance, below, diffuse, one, specular, i);
+      add_truth(out.specular, {}, diffuse, one, specular, i);
+      add_truth(out.transport, below, diffuse, eyes.albedo[p], truths.bands, i);
+      // Bands minus lobe, as an error of the whole radiance.
+      out.truncation.shown.push_back(out.transport.truth.back());
+      out.truncation.truth.push_back(out.radiance.truth.back());
+      const Vec3d a = eyes.albedo[p] * truths.bands.half_a[i] - specular.half_a[i];
+      const Vec3d b = eyes.albedo[p] * truths.bands.half_b[i] - specular.half_b[i];
+      out.truncation.half_a.push_back(a);
+      out.truncation.half_b.push_back(b);
     }
   };
   for (std::size_t k = 0; k < light.sh.size(); ++k) {
@@ -184,16 +209,24 @@ GlossyCertificate certify_glossy(const BakedScene& decoded, const Tracer& truth,
   constexpr double kPathsOfRay = 0.05 / 18 / kPoints;
   out.samples = static_cast<int>(std::clamp(kPathsOfRay * static_cast<double>(options.bake_rays), 64.0, 1024.0));
   const ReferenceOptions paths{.samples = out.samples, .seed = mix64(options.seed ^ 0x6c6f6265ULL)};
-  const ReferenceResult diffuse = trace_reference(truth, eyes.below, light, paths, threads);
-  const ReferenceResult specular =
-      trace_specular(truth, eyes.truth, light, {.samples = out.samples, .seed = mix64(paths.seed)}, threads);
+  const ReferenceOptions again{.samples = out.samples, .seed = mix64(paths.seed)},
+      more{out.samples, -1, mix64(again.seed)};
+  Truths truths{.specular = trace_specular(truth, eyes.truth, light, again, threads),
+                .bands = trace_kernels(truth, {eyes.truth, eyes.kernel}, light, more, threads)};
+  // Metals have nothing below.
+  const bool metals = std::ranges::all_of(eyes.diffuse, [](const Vec3d& d) { return d == Vec3d{}; });
+  const std::vector<Vec3d> nothing(truths.specular.value.size());
+  truths.diffuse =
+      metals ? ReferenceResult{nothing, nothing, nothing} : trace_reference(truth, eyes.below, light, paths, threads);
 
-  const Judged judged = look(decoded, eyes, light, diffuse, specular);
+  const Judged judged = look(decoded, eyes, light, truths);
   const std::vector<bool> kept = kept_lightings(judged.radiance, lightings, out.points);
   for (std::size_t k = 0; k < kept.size(); ++k)
     (kept[k] ? out.lightings : out.dark).push_back(k < lightings.names.size() ? lightings.names[k] : "lamps");
   out.radiance = judged.radiance.of(kept, out.points).judge(out.points, options.seed);
   out.specular = judged.specular.of(kept, out.points).judge(out.points, options.seed);
+  out.transport = judged.transport.of(kept, out.points).judge(out.points, options.seed);
+  out.truncation = judged.truncation.of(kept, out.points).judge(out.points, options.seed);
   if (!judged.job.truth.empty()) out.job_light = judged.job.judge(out.points, options.seed);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return out;

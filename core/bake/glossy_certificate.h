@@ -5,8 +5,13 @@
 //           the half space of its normal. The reference stands at the nearest place of the input surface.
 // Radiance  all that leaves towards the eye (core/artifact/eye.h): diffuse below the specular layer, and specular
 // Specular  the latter alone
-// Both under lightings of the matrices' own order, as in certificate.h; `job_light` is radiance under the job's own
-// light in full detail, lamps and all: it adds what the order cannot hold of light and lobe.
+// Transport radiance against a truth that shows through the lobe's kernel of the matrices' bands (lobe_table.h) all
+// that
+//           arrives: noise, interpolation and storage; the faults of the bake
+// Truncation of that truth against the real one: what those bands cannot hold of lobes and of what arrives between
+//           solids, whatever a bake spends. Radiance is both.
+// All under lightings of the matrices' own order, as in certificate.h; `job_light` is radiance under the job's own
+// light in full detail, lamps and all: it adds what the order cannot hold of light.
 // Truth     the first reflection has the material's GGX lobe, later ones are diffuse as everywhere; the share that the
 //           specular layer keeps from the diffuse one is the bake's own formula. Highlights of punctual lights are in
 //           neither.
@@ -23,7 +28,7 @@
 namespace kiln {
 
 struct GlossyCertificate {
-  ErrorStats radiance, specular;
+  ErrorStats radiance, specular, transport, truncation;
   std::vector<std::string> lightings;   // judged, in the order of radiance.by_lighting
   std::vector<std::string> dark;        // hardly reach the surface: not judged
   std::optional<ErrorStats> job_light;  // when the job has any

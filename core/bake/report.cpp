@@ -90,6 +90,8 @@ ordered_json glossy_object(const GlossyReport& g) {
   for (std::size_t i = 0; i < c.lightings.size() && i < c.radiance.by_lighting.size(); ++i)
     out["radiance"]["lightings"].push_back({{"name", c.lightings[i]}, {"relrmse", c.radiance.by_lighting[i]}});
   out["specular"] = error_object(c.specular);
+  out["transport"] = error_object(c.transport);
+  out["truncation"] = error_object(c.truncation);
   if (c.job_light) out["job_light"] = error_object(*c.job_light);
   out["dark"] = c.dark;
   out["points"] = c.points;

@@ -171,19 +171,25 @@ Lobe lobe_at(const LobeTable& table, double nv, double roughness) {
   return out;
 }
 
-Vec3d reflected_light(const Lobe& lobe, const Vec3d& normal, const Vec3d& view, const Vec3d* light) {
+LobeKernel lobe_kernel(const Lobe& lobe, const Vec3d& normal, const Vec3d& view) {
   const Vec3d away = normalized(normal * dot(normal, view) - view, basis_around(normal).x);
-  const Axes axes = axes_around(normal, away);
-  std::array<double, sh_count(kMaxLobeOrder)> y;
-  Vec3d out = light[0] * (lobe.constant * kY00);
-  for (std::size_t j = 0; j < axes.size(); ++j) {
-    evaluate_sh(lobe.order, axes[j], y.data());
+  LobeKernel out{lobe.constant * kY00}, y;
+  for (std::size_t j = 0; const Vec3d& axis : axes_around(normal, away)) {
+    evaluate_sh(lobe.order, axis, y.data());
     for (int l = 1; l < lobe.order; ++l) {
       const double gain = lobe.gain[static_cast<std::size_t>(l)][j];
       for (auto i = static_cast<std::size_t>(l * l); i < static_cast<std::size_t>((l + 1) * (l + 1)); ++i)
-        out += light[i] * (gain * y[i]);
+        out[i] += gain * y[i];
     }
+    ++j;
   }
+  return out;
+}
+
+Vec3d reflected_light(const Lobe& lobe, const Vec3d& normal, const Vec3d& view, const Vec3d* light) {
+  const LobeKernel kernel = lobe_kernel(lobe, normal, view);
+  Vec3d out;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(sh_count(lobe.order)); ++i) out += light[i] * kernel[i];
   return {std::max(0.0, out.x), std::max(0.0, out.y), std::max(0.0, out.z)};
 }
 

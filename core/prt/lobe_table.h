@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "core/base/vec.h"
+#include "core/sphere/sh.h"
 
 namespace kiln {
 
@@ -54,6 +55,10 @@ struct Lobe {
   double kept() const { return 0.04 * a + b; }
 };
 Lobe lobe_at(const LobeTable&, double nv, double roughness);
+
+/// Equation 1 without F0 a + b as weights of the light's coefficients, order^2 of them.
+using LobeKernel = std::array<double, sh_count(kMaxLobeOrder)>;
+LobeKernel lobe_kernel(const Lobe&, const Vec3d& normal, const Vec3d& view);
 
 /// Equation 1 without F0 a + b, RGB. `view` is unit and points to the eye; from below the surface it counts as grazing.
 /// `light` has order^2 coefficients. Negative light (ringing) counts as 0.

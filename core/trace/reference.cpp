@@ -70,8 +70,10 @@ class Estimator {
   /// Adds one path from `start` to sum[lighting]. Returns its vertices.
   int add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
-  /// The same, reflected to the eye by the lobe of `point` first.
-  int add_specular_path(const EyedPoint& point, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+  /// The same, weighed by a lobe at `point` first. A lobe draws directions in the frame of the normal, tells their
+  /// density, and what light from one of them counts, cosine and all.
+  template <class Lobe>
+  int add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
   std::uint64_t rays_per_vertex() const {
     std::uint64_t rays = 1;
@@ -81,12 +83,8 @@ class Estimator {
   }
 
  private:
-  struct Seen {
-    Vertex at;
-    Basis<double> basis;
-    Vec3d view;  // in it
-  };
-  void add_specular_sky(const EyedPoint&, const Seen&, PathNumbers&, std::vector<Vec3d>& sum) const;
+  template <class Lobe>
+  void add_lobe_sky(const Vertex&, const Lobe&, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_lamps(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   Vec3d emitter_light(const Vertex&, double pick, const Vec2<double>& u) const;
@@ -212,37 +210,83 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
   return depth + 1;
 }
 
-Vec3d fresnel(const Vec3d& f0, const Vec3d& v, const Vec3d& l) {
-  return f0 + (Vec3d{1, 1, 1} - f0) * schlick_weight(v, l);
-}
+/// The GGX lobe of a surface towards an eye.
+class GgxLobe {
+ public:
+  explicit GgxLobe(const EyedPoint& point)
+      : alpha_(point.alpha),
+        f0_(point.f0),
+        view_(basis_around(normalized(to_double(point.at.normal))).to_local(normalized(to_double(point.view)))) {}
 
-void Estimator::add_specular_sky(const EyedPoint& point, const Seen& seen, PathNumbers& numbers,
-                                 std::vector<Vec3d>& sum) const {
+  bool seen() const { return view_.z > 0; }
+  /// May lie below the surface, where the density is 0.
+  Vec3d draw(const Vec2<double>& u) const { return sample_ggx(alpha_, view_, u).l; }
+  double density(const Vec3d& l) const { return ggx_density(alpha_, view_, l); }
+  Vec3d value(const Vec3d& l) const {
+    return (f0_ + (Vec3d{1, 1, 1} - f0_) * schlick_weight(view_, l)) * ggx_cosine(alpha_, view_, l);
+  }
+
+ private:
+  double alpha_;
+  Vec3d f0_, view_;
+};
+
+/// A kernel of few bands: half of its directions are those of a GGX lobe, half even over the half space.
+class KernelLobe {
+ public:
+  KernelLobe(const EyedPoint& point, const std::vector<double>& kernel)
+      : like_(point), basis_(basis_around(normalized(to_double(point.at.normal)))), kernel_(kernel) {
+    while (sh_count(order_) < static_cast<int>(kernel.size())) ++order_;
+  }
+
+  bool seen() const { return like_.seen(); }
+  Vec3d draw(const Vec2<double>& u) const {
+    if (u.x < 0.5) return like_.draw({2 * u.x, u.y});
+    const double z = 2 * u.x - 1, r = std::sqrt(std::max(0.0, 1 - z * z)), phi = 2 * std::numbers::pi * u.y;
+    return {r * std::cos(phi), r * std::sin(phi), z};
+  }
+  double density(const Vec3d& l) const { return l.z > 0 ? 0.5 * like_.density(l) + 0.25 / std::numbers::pi : 0; }
+  Vec3d value(const Vec3d& l) const {
+    if (!(l.z > 0)) return {};
+    std::array<double, sh_count(kMaxShOrder)> y;
+    evaluate_sh(order_, normalized(basis_.to_world(l)), y.data());
+    double sum = 0;
+    for (std::size_t i = 0; i < kernel_.size(); ++i) sum += kernel_[i] * y[i];
+    return {sum, sum, sum};
+  }
+
+ private:
+  GgxLobe like_;
+  Basis<double> basis_;
+  const std::vector<double>& kernel_;
+  int order_ = 1;
+};
+
+template <class Lobe>
+void Estimator::add_lobe_sky(const Vertex& v, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+  const Basis<double> basis = basis_around(v.normal);
   for (std::size_t k = 0; k < samplers_.size(); ++k) {
     if (!samplers_[k].useful()) continue;
-    const Vec3d w = samplers_[k].sample(numbers.pair(0)), l = seen.basis.to_local(w);
-    const double lobe = ggx_cosine(point.alpha, seen.view, l);
-    if (lobe <= 0 || tracer_.occluded(lifted(seen.at), to_float(w), kFar)) continue;
-    const double density = samplers_[k].density(w) + ggx_density(point.alpha, seen.view, l);
-    sum[k] += times(fresnel(point.f0, seen.view, l) * (lobe / density),
-                    environment_radiance(light_.environments[k], to_float(w)));
+    const Vec3d w = samplers_[k].sample(numbers.pair(0)), l = basis.to_local(w), value = lobe.value(l);
+    if (value == Vec3d{} || tracer_.occluded(lifted(v), to_float(w), kFar)) continue;
+    const double density = samplers_[k].density(w) + lobe.density(l);
+    sum[k] += times(value / density, environment_radiance(light_.environments[k], to_float(w)));
   }
 }
 
-int Estimator::add_specular_path(const EyedPoint& point, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
-  const Vec3d normal = normalized(to_double(point.at.normal));
-  const Basis<double> basis = basis_around(normal);
-  const Seen seen{{to_double(point.at.position), normal, to_double(point.at.face_normal)},
-                  basis,
-                  basis.to_local(normalized(to_double(point.view)))};
-  if (!(seen.view.z > 0)) return 1;
-  const GgxSample s = sample_ggx(point.alpha, seen.view, numbers.pair(0));
-  add_specular_sky(point, seen, numbers, sum);
-  if (!(s.weight > 0)) return 1;
-  const Vec3d weight = fresnel(point.f0, seen.view, s.l) * s.weight, w = normalized(basis.to_world(s.l));
-  const Hit hit = tracer_.closest(lifted(seen.at), to_float(w), kFar);
+template <class Lobe>
+int Estimator::add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers,
+                             std::vector<Vec3d>& sum) const {
+  const Vertex v{to_double(point.position), normalized(to_double(point.normal)), to_double(point.face_normal)};
+  if (!lobe.seen()) return 1;
+  const Vec3d l = lobe.draw(numbers.pair(0));
+  add_lobe_sky(v, lobe, numbers, sum);
+  const double density = lobe.density(l);
+  if (!(density > 0)) return 1;
+  const Vec3d weight = lobe.value(l) / density, w = normalized(basis_around(v.normal).to_world(l));
+  const Hit hit = tracer_.closest(lifted(v), to_float(w), kFar);
   if (!hit) {
-    add_sky(w, ggx_density(point.alpha, seen.view, s.l), weight, sum);
+    add_sky(w, density, weight, sum);
     return 1;
   }
   const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
@@ -315,7 +359,19 @@ ReferenceResult trace_specular(const Tracer& tracer, std::span<const EyedPoint> 
   const Estimator estimator(tracer, light, options);
   return estimate(estimator, points.size(), options, threads,
                   [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
-                    return estimator.add_specular_path(points[point], numbers, sum);
+                    return estimator.add_lobe_path(points[point].at, GgxLobe(points[point]), numbers, sum);
+                  });
+}
+
+ReferenceResult trace_kernels(const Tracer& tracer, const KernelPoints& points, const ReferenceLight& light,
+                              const ReferenceOptions& options, Threads& threads) {
+  EXPECTS(options.samples >= 1 && points.kernel.size() == points.eyed.size());
+  check_light(light);
+  const Estimator estimator(tracer, light, options);
+  return estimate(estimator, points.eyed.size(), options, threads,
+                  [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+                    const EyedPoint& eyed = points.eyed[point];
+                    return estimator.add_lobe_path(eyed.at, KernelLobe(eyed, points.kernel[point]), numbers, sum);
                   });
 }
 

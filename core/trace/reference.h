@@ -72,4 +72,15 @@ struct EyedPoint {
 ReferenceResult trace_specular(const Tracer&, std::span<const EyedPoint>, const ReferenceLight&,
                                const ReferenceOptions&, Threads&);
 
+/// The same, but with a kernel of few bands in place of the lobe:
+///   integral over the hemisphere of n of L(x, w) K(w) dw,   K(w) = sum_i kernel_i Y_i(w)
+/// kernel[point] has order^2 numbers in world axes, 1 <= order <= kMaxShOrder; the points' lobes only say where most
+/// directions are drawn. What is seen past the view's horizon is 0, as above.
+struct KernelPoints {
+  std::span<const EyedPoint> eyed;
+  std::span<const std::vector<double>> kernel;  // same size
+};
+ReferenceResult trace_kernels(const Tracer&, const KernelPoints&, const ReferenceLight&, const ReferenceOptions&,
+                              Threads&);
+
 }  // namespace kiln
