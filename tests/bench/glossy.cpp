@@ -9,6 +9,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -204,6 +205,26 @@ void split_transport(const BakedScene& baked, const Lightings& lightings, const 
   print("delivered", against(delivered, point, seen.size()));
 }
 
+/// Lightings that hardly reach the surface are dropped, as in the certificate.
+Lightings that_reach(const Lightings& all, const std::vector<EyedPoint>& eyed, const Tracer& tracer, Threads& threads) {
+  const ReferenceResult seen = trace_specular(
+      tracer, eyed, {.sh_order = static_cast<int>(std::lround(std::sqrt(all.sh[0].size()))), .sh = all.sh},
+      {.samples = 256, .seed = 3}, threads);
+  std::vector<double> mean;
+  for (std::size_t k = 0; k < all.sh.size(); ++k) {
+    double sum = 0;
+    for (std::size_t p = 0; p < eyed.size(); ++p) sum += std::abs(seen.value[k * eyed.size() + p].x);
+    mean.push_back(sum / double{all.sh[k][0].x});
+  }
+  Lightings out;
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    if (mean[k] < 0.05 * std::ranges::max(mean)) continue;
+    out.names.push_back(all.names[k]);
+    out.sh.push_back(all.sh[k]);
+  }
+  return out;
+}
+
 Bytes bytes_of(const char* path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
@@ -220,9 +241,9 @@ int run(int argc, char** argv) {
   const std::vector<Seen> seen = open_eyes(*baked, *input, count);
   std::vector<EyedPoint> eyed;
   for (const Seen& s : seen) eyed.push_back(s.truth);
-  const Lightings lightings = test_lightings(baked->glossy.order, {});
-  const ReferenceLight light{.sh_order = baked->glossy.order, .sh = lightings.sh};
   const Tracer tracer(*input, threads);
+  const Lightings lightings = that_reach(test_lightings(baked->glossy.order, {}), eyed, tracer, threads);
+  const ReferenceLight light{.sh_order = baked->glossy.order, .sh = lightings.sh};
   // Schlick's term of F0 = 1 is none: the lobe times 1.
   const ReferenceResult lobe = trace_specular(tracer, eyed, light, {.samples = paths, .seed = 1}, threads);
   ReferenceResult own;
