@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "core/sphere/sh.h"
 #include "core/trace/ggx.h"
@@ -116,6 +117,65 @@ TEST(Specular, AMirrorShowsTheLampOverItAndTheDiffuseLightBesideIt) {
   double value = 0;
   for (const Vec3d& x : diffuse.value) value += x.x / 64;
   EXPECT_NEAR(seen.value.x, 0.5 * value, 4 * seen.error + 5e-3);
+}
+
+Mean run_kernel(const Scene& scene, const EyedPoint& point, const std::vector<double>& kernel,
+                const ReferenceLight& light) {
+  Threads threads(2);
+  const std::vector<EyedPoint> points(64, point);
+  const std::vector<std::vector<double>> kernels(64, kernel);
+  const ReferenceResult result =
+      trace_kernels(Tracer(scene, threads), {points, kernels}, light, {.samples = 256}, threads);
+  Mean out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    out.value += result.value[i] / 64.0;
+    out.error += std::pow((result.half_a[i].x - result.half_b[i].x) / 2 / 64, 2);
+  }
+  out.error = std::sqrt(out.error);
+  return out;
+}
+
+TEST(Specular, AKernelIsIntegratedOverTheHalfSpaceOnly) {
+  // Light Y_1-1 = c y over the floor, c = sqrt(3 / 4 pi): with a kernel of 1 (2 sqrt(pi) Y_00) c pi, with one of Y_1-1
+  // half of its norm, 1/2; with Y_10 = c z nothing, by symmetry.
+  std::vector<Vec3f> up(4);
+  up[1] = {1, 1, 1};
+  const ReferenceLight light{.sh_order = 2, .sh = {up}};
+  const double root = 2 * std::sqrt(std::numbers::pi), c = std::sqrt(3 / (4 * std::numbers::pi));
+  for (const double roughness : {0.2, 0.7}) {
+    const EyedPoint point = eyed(0.8, roughness, {1, 1, 1});
+    const Mean constant = run_kernel(open_floor(), point, {root}, light);
+    const Mean same = run_kernel(open_floor(), point, {0, 1, 0, 0}, light);
+    const Mean across = run_kernel(open_floor(), point, {0, 0, 1, 0}, light);
+    EXPECT_NEAR(constant.value.x, c * std::numbers::pi, 4 * constant.error);
+    EXPECT_NEAR(same.value.y, 0.5, 4 * same.error);
+    EXPECT_NEAR(across.value.z, 0, 4 * across.error);
+    EXPECT_LT(constant.error + same.error + across.error, 0.06);
+  }
+}
+
+TEST(Specular, AKernelSeesWhatHidesTheSkyAndTheSunOfAMap) {
+  Scene scene = open_floor();
+  add_quad(scene, {0, 0, -50}, {0, 50, 0}, {0, 0, 100}, add_material(scene, {0, 0, 0}));
+  add_quad(scene, {0, 0, -50}, {0, 0, 100}, {0, 50, 0}, add_material(scene, {0, 0, 0}));
+  EyedPoint point = eyed(0.8, 0.5, {1, 1, 1});
+  point.at.position = {-0.01F, 0, 0};
+  const std::vector<double> one{2 * std::sqrt(std::numbers::pi)};
+  const Mean half = run_kernel(scene, point, one, {.environments = {constant_sky({1, 1, 1})}});
+  EXPECT_NEAR(half.value.x, std::numbers::pi, 4 * half.error + 2e-3);  // the wall ends: 4e-4 of the half space
+  Environment map;
+  map.width = 32;
+  map.height = 16;
+  map.radiance.assign(32 * 16, {0, 0, 0});
+  double truth = 0;  // solid angle of the rows above the horizon, one texel of each
+  for (std::size_t y = 0; y < 8; ++y) {
+    map.radiance[y * 32 + 3] = {40, 40, 40};
+    const double top = std::cos(std::numbers::pi * static_cast<double>(y) / 16);
+    truth += 40 * (top - std::cos(std::numbers::pi * static_cast<double>(y + 1) / 16)) * 2 * std::numbers::pi / 32;
+  }
+  const Mean sun = run_kernel(open_floor(), eyed(0.8, 0.5, {1, 1, 1}), one, {.environments = {map}});
+  EXPECT_NEAR(sun.value.x, truth, 4 * sun.error + 0.03 * truth);  // texels are interpolated at their rims
+  EXPECT_LT(sun.error, 0.02 * truth);
 }
 
 TEST(Specular, FinishIsFactorTimesTextureInBlueAndGreen) {
