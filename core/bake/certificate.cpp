@@ -18,7 +18,7 @@
 namespace kiln {
 namespace {
 
-constexpr std::size_t kFewestPoints = 1024, kMostPoints = 8192;
+constexpr std::size_t kFewestPoints = 1024, kMostPoints = 16384;
 constexpr int kPilotSamples = 16;
 
 /// Points on the delivered surface and their places on the input's.
@@ -310,20 +310,22 @@ struct Spending {
 };
 
 /// A function of the scene and the bake's rays, never of time, so that reports repeat.
+/// Of P paths, S at each of P / S points, an estimate of the mean squared error m from points whose squared errors vary
+/// by c m^2 and paths of variance v has variance ~ (S c m^2 + 4 m v + 2 v^2 / S) / P: least at S = (v / m) sqrt(2 / c).
+/// Errors are rare and large (c = 30 on the dungeon, 400 on the hotel), so that more points beat quieter ones.
 Spending plan_spending(const ErrorStats& pilot, double rays_per_path, const CertificateOptions& options) {
   constexpr double kShare = 0.05, kSingleRay = 6;  // a ray of a path costs six of a packet: measured on the scenes
   constexpr double kTenthSecond = 128 * kFewestPoints, kSecond = 1536 * kFewestPoints,
                    kMostPaths = 4096 * kFewestPoints;
-  constexpr double kNoise = 0.75;  // of the reference at one point, in errors: over thousands of points it is nothing
-  // Rare gross errors, like a strip of floor under a column, are a thousandth of the surface and most of the error:
-  // where a promise hangs on it, enough points to meet some.
+  constexpr double kSpread = 30, kFewestSamples = 8;  // c: measured on the scenes
+  // Where a promise hangs on it, enough points to meet some of the errors of a thousandth of the surface.
   const double fewest = options.thorough ? 4.0 * kFewestPoints : 1.0 * kFewestPoints;
   const double paths = std::clamp(kShare * static_cast<double>(options.bake_rays) / (kSingleRay * rays_per_path),
                                   options.thorough ? kSecond : kTenthSecond, kMostPaths);
   const double one_path = pilot.noise * pilot.noise * kPilotSamples;  // its variance
-  const double wanted = pilot.relrmse > 0 ? one_path / (kNoise * kNoise * pilot.relrmse * pilot.relrmse) : kMostPaths;
+  const double wanted = pilot.relrmse > 0 ? one_path / (pilot.relrmse * pilot.relrmse) * std::sqrt(2 / kSpread) : paths;
   Spending out;
-  out.samples = static_cast<int>(std::clamp(wanted, 32.0, paths / fewest));
+  out.samples = static_cast<int>(std::clamp(wanted, kFewestSamples, paths / fewest));
   out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, fewest, double{kMostPoints}));
   return out;
 }

@@ -1,0 +1,5 @@
+if(TARGET kiln_bake AND TARGET kiln_client)
+  add_executable(kiln_coverage coverage.cpp)
+  kiln_flags(kiln_coverage)
+  target_link_libraries(kiln_coverage PRIVATE kiln_client kiln_bake nlohmann_json::nlohmann_json)
+endif()

@@ -1,0 +1,100 @@
+// How often does a certificate's interval hold the error? Certifies one delivered file again with many seeds, each with
+// points and paths of its own, and takes the mean of their squared errors for the truth: a hundred times the points.
+//   kiln_coverage MODEL.glb OUT/scene.glb [--env NAME] [--seeds 100]      OUT is what `kiln bake MODEL.glb` delivered
+// Two JSON lines, transport error and error under the job's light: truth, share of intervals that hold it, that lie
+// above it and below it, their median width, the spread of the estimate (all relative to the truth), median seconds.
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client_cli/files.h"
+#include "client_cli/models.h"
+#include "client_cli/recipe_input.h"
+#include "core/bake/certificate.h"
+#include "tests/bench/bench.h"
+
+namespace kiln {
+namespace {
+
+using nlohmann::json;
+
+double truth_of(const std::vector<ErrorStats>& all) {
+  double sum = 0;
+  for (const ErrorStats& e : all) sum += e.relrmse * e.relrmse;
+  return std::sqrt(sum / static_cast<double>(all.size()));
+}
+
+void print(const std::string& what, const std::vector<ErrorStats>& all, const std::vector<double>& seconds) {
+  if (all.empty()) return;
+  const double truth = truth_of(all), count = static_cast<double>(all.size());
+  double above = 0, below = 0, variance = 0;
+  std::vector<double> widths, points;
+  for (const ErrorStats& e : all) {
+    above += e.interval_low > truth;
+    below += e.interval_high < truth;
+    variance += (e.relrmse - truth) * (e.relrmse - truth) / count;
+    widths.push_back((e.interval_high - e.interval_low) / truth);
+    points.push_back(static_cast<double>(e.points));
+  }
+  std::printf("%s\n", json{{"error", what},
+                           {"truth", truth},
+                           {"holds", 1 - (above + below) / count},
+                           {"above", above / count},
+                           {"below", below / count},
+                           {"width", bench::median(widths)},
+                           {"spread", std::sqrt(variance) / truth},
+                           {"points", bench::median(points)},
+                           {"seconds", bench::median(seconds)}}
+                          .dump()
+                          .c_str());
+}
+
+template <class T>
+T need(Outcome<T> outcome, const std::string& what) {
+  if (outcome) return std::move(*outcome);
+  std::fprintf(stderr, "%s: %s\n", what.c_str(), outcome.error().problem.detail.c_str());
+  std::exit(1);
+}
+
+int run(const std::vector<std::string>& words) {
+  std::vector<std::string> paths;
+  LightOptions light;
+  std::uint64_t seeds = 100;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == "--env" && i + 1 < words.size()) {
+      light.name = words[++i];
+    } else if (words[i] == "--seeds" && i + 1 < words.size()) {
+      seeds = std::stoull(words[++i]);
+    } else {
+      paths.push_back(words[i]);
+    }
+  }
+  if (paths.size() != 2) return 1;
+  Threads threads;
+  const Scene scene = need(load_scene(paths[0]), paths[0]);
+  const BakedScene baked = need(load_artefact(paths[1]), paths[1]);
+  const auto environment = need(load_light(light), light.name);
+  const auto report = std::filesystem::path(paths[1]).replace_filename("report.json").string();
+  const auto rays = json::parse(need(read_text(report), report)).at("rays").get<std::uint64_t>();
+  const Tracer truth(scene, threads);
+  std::vector<ErrorStats> transport, job_light;
+  std::vector<double> seconds;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const Certificate c = certify(baked, truth, environment, {.bake_rays = rays, .seed = seed}, threads);
+    transport.push_back(c.transport);
+    if (c.job_light) job_light.push_back(*c.job_light);
+    seconds.push_back(c.seconds);
+  }
+  print("transport", transport, seconds);
+  print("job light", job_light, seconds);
+  return 0;
+}
+
+}  // namespace
+}  // namespace kiln
+
+int main(int count, char** words) { return kiln::run({words + 1, words + count}); }
