@@ -218,7 +218,8 @@ export function arrivingLight(
   const one = new Float32Array(3 * vertices);
   arriving.forEach((transfer, o) => {
     lightOfStored(transfer, attributes, light, lamps, one);
-    for (let v = 0; v < vertices; ++v) out.set(one.subarray(3 * v, 3 * v + 3), 4 * (v * arriving.length + o));
+    for (let from = 0, to = 4 * o; from < one.length; from += 3, to += 4 * arriving.length)
+      [out[to], out[to + 1], out[to + 2]] = [one[from], one[from + 1], one[from + 2]];
   });
   return out;
 }
