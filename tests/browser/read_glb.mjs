@@ -95,7 +95,8 @@ export function radianceTowards({ json, binary, extension }, part, v, view, ligh
   const { metallicFactor: metallic = 1, roughnessFactor: roughness = 1 } = part.material.pbrMetallicRoughness;
   const n = unit([...part.normal.subarray(3 * v, 3 * v + 3)]);
   const nv = dot(n, view);
-  const number = lobeBetween(floatsOf(json, binary, glossy.lobes.bufferView), 3 + 5 * (glossy.order - 1), roughness, nv);
+  const table = floatsOf(json, binary, glossy.lobes.bufferView);
+  const number = lobeBetween(table, 3 + 5 * (glossy.order - 1), roughness, nv);
   const t = unit(n.map((x, i) => x * nv - view[i]));
   const arriving = part.arrivingAt(v, light);
   const mirror = arriving[0].map((x) => number(2) * x * Math.sqrt(1 / (4 * Math.PI)));

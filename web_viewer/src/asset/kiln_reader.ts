@@ -15,9 +15,10 @@
 //     part.mesh.material.color.setRGB(...part.albedo);
 //   }
 //
-// What leaves the surface is  albedo * value + emission.  (Parts with `glossy` have transfer matrices too: arrivingLight() gives
-// the light that a lobe reflects, and the "Specular parts" of the format say how.)  Basis: real spherical harmonics without the Condon-Shortley phase in
-// world axes (+Y up), index i = l(l+1)+m: three's own LightProbe convention. core/artifact/README.md specifies the format.
+// What leaves the surface is  albedo * value + emission.  Basis: real spherical harmonics without the Condon-Shortley
+// phase in world axes (+Y up), index i = l(l+1)+m: three's own LightProbe convention. core/artifact/README.md specifies
+// the format. Parts with `glossy` have transfer matrices too: arrivingLight() gives the light that their lobes reflect,
+// and "Specular parts" there says how.
 
 import type { BufferAttribute, BufferGeometry, Mesh, Object3D } from 'three';
 
@@ -127,8 +128,8 @@ function floatsOf(bytes: ArrayBuffer, count: number): Float32Array {
   return Float32Array.from({ length: count }, (_, i) => view.getFloat32(4 * i, true));
 }
 
-/// The matrices as order^2 transfer vectors that share their stored numbers: number o gives coefficient o of what arrives.
-/// `bytes`: of the view of their components. Throws on another size.
+/// The matrices as order^2 transfer vectors that share their stored numbers: the o-th gives coefficient o of what
+/// arrives. `bytes`: of the view of their components. Throws on another size.
 export function arrivingTransfers(e: GlossyExtension, bytes: ArrayBuffer): StoredTransfer[] {
   const outputs = e.order * e.order;
   const inputs = outputs + (e.fixed ? 1 : 0);
@@ -167,7 +168,8 @@ function checkShape(e: RadianceTransferExtension): void {
     e.offset?.length === numbers &&
     e.attributes?.length === Math.ceil(numbers / 4);
   if (e.version !== 2) throw new Error(`${kName} version ${e.version} is not the one this reader knows`);
-  if (!good || (e.glossy && !isSound(e.glossy, e.order))) throw new Error(`${kName} does not describe its own attributes`);
+  if (!good || (e.glossy && !isSound(e.glossy, e.order)))
+    throw new Error(`${kName} does not describe its own attributes`);
 }
 
 function isSound(g: GlossyExtension, most: number): boolean {
@@ -188,7 +190,10 @@ function isSound(g: GlossyExtension, most: number): boolean {
 }
 
 /// The `_PRT_k` arrays of a geometry, four numbers each. GLTFLoader lower-cases attribute names.
-export function transferAttributes(e: Pick<RadianceTransferExtension, 'attributes'>, geometry: BufferGeometry): Float32Array[] {
+export function transferAttributes(
+  e: Pick<RadianceTransferExtension, 'attributes'>,
+  geometry: BufferGeometry,
+): Float32Array[] {
   return e.attributes.map((name) => {
     const attribute = geometry.getAttribute(name.toLowerCase()) as BufferAttribute | undefined;
     if (!attribute || attribute.itemSize !== 4) throw new Error(`${kName}: a primitive lacks ${name}`);
@@ -205,8 +210,8 @@ export const lightValues = (
   lamps = true,
 ): Float32Array => lightOfStored(e, transferAttributes(e, geometry), light, lamps);
 
-/// Light that arrives at the vertices of a specular part, from the half space of their normals, as SH coefficients in world axes:
-/// out[4 * (v * order^2 + o) + channel], the fourth number 0. `attributes`: its `_GLOSSY_k` arrays.
+/// Light that arrives at the vertices of a specular part, from the half space of their normals, as SH coefficients in
+/// world axes: out[4 * (v * order^2 + o) + channel], the fourth number 0. `attributes`: its `_GLOSSY_k` arrays.
 export function arrivingLight(
   arriving: readonly StoredTransfer[],
   attributes: readonly Float32Array[],

@@ -4,7 +4,15 @@ import { loadDraco } from '../asset/draco_module';
 import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
-import type { OpenRequest, ProjectReply, ProjectRequest, RelightRequest, Reply, Request, ValuesReply } from './messages';
+import type {
+  OpenRequest,
+  ProjectReply,
+  ProjectRequest,
+  RelightRequest,
+  Reply,
+  Request,
+  ValuesReply,
+} from './messages';
 import { coefficientsOf, pickCoefficient, quantile, triangleMeasure } from './transfer';
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
@@ -29,7 +37,9 @@ const relight = (light: Float32Array, lamps: boolean, reuse: Float32Array[]): Fl
 
 /// What arrives at the parts that have matrices; nothing for others.
 const arrive = (light: Float32Array, lamps: boolean): Float32Array[] =>
-  parts.map(({ weights }) => (weights.length > 0 ? arrivingLight(arriving, weights, light, lamps) : new Float32Array(0)));
+  parts.map(({ weights }) =>
+    weights.length > 0 ? arrivingLight(arriving, weights, light, lamps) : new Float32Array(0),
+  );
 
 /// Lamps count: they are there whatever the sky.
 function level(light: Float32Array): number {

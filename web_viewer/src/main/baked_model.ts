@@ -116,7 +116,8 @@ export class BakedModel {
   /// Metalness and roughness of an original material.
   private async loadFinish({ gltf }: LoadedAsset, material: number, lobes: DataTexture): Promise<Finish> {
     const definition = (gltf.parser.json as { materials?: GltfMaterial[] }).materials?.[material];
-    const { metallicFactor = 1, roughnessFactor = 1, metallicRoughnessTexture } = definition?.pbrMetallicRoughness ?? {};
+    const finish = definition?.pbrMetallicRoughness ?? {};
+    const { metallicFactor = 1, roughnessFactor = 1, metallicRoughnessTexture } = finish;
     const loaded: { map?: Texture } = {};
     if (metallicRoughnessTexture) await gltf.parser.assignTexture(loaded, 'map', metallicRoughnessTexture);
     const order = this.transfer.glossy!.order;

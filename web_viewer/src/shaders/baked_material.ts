@@ -1,6 +1,7 @@
 // The material of baked light:  radiance = albedo * value + emission, then exposure, tone mapping and sRGB.
 // Where a part has matrices (mirror.ts):
-//   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission,  F0 = mix(0.04, albedo, metallic)
+//   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission
+//   F0 = mix(0.04, albedo, metallic)
 //
 // `value` (attribute `light`, linear RGB) was computed by the light worker; nothing here depends on the number of coefficients.
 // Exposure and tone mapping are three's (renderer.toneMapping): the same for baked and original materials.

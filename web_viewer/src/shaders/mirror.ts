@@ -1,9 +1,10 @@
-// What a specular part reflects of the light that arrives at its vertices (core/prt/lobe_table.h, core/artifact/README.md):
+// What a specular part reflects of the light that arrives at its vertices (core/prt/lobe_table.h):
 //   mirror = max(0, sum_i K_i L_i),   K_00 = gain_0 Y_00,   K_lm = sum_j gain_lj Y_lm(axis_j)
 //   axis_j = n cos(72 j) + t sin(72 j) degrees,   t = the direction along the surface away from the eye
-// L changes with the light only: the worker computes it, and it waits in a texture. K hangs on the eye and is made here, at each
-// vertex of each picture, so that a moving camera costs the processor nothing. Mirror is interpolated over the triangle, where
-// the format interpolates L: the same at vertices, and as near between them as triangles are small.
+// L changes with the light only: the worker computes it, and it waits in a texture. K hangs on the eye and is made
+// here, at each vertex of each picture, so that a moving camera costs the processor nothing. Mirror is interpolated
+// over the triangle, where the format interpolates L: the same at vertices, and as near between them as triangles
+// are small.
 
 import { DataTexture, FloatType, RGBAFormat } from 'three';
 import { lobeWidth } from '../asset/kiln_reader';
@@ -42,7 +43,8 @@ vec4 lobeEntry(int row, int view, int k) {
   return texelFetch(lobes, ivec2(at % ${kAcross}, at / ${kAcross}), 0);
 }
 vec4 lobeAt(float nv, float roughness, int k) {
-  vec2 place = vec2(clamp(roughness, 0.0, 1.0) * ${kLobeRows - 1}.0, acos(clamp(nv, 0.0, 1.0)) * ${(kLobeViews - 1) / (Math.PI / 2)});
+  float angle = acos(clamp(nv, 0.0, 1.0));
+  vec2 place = vec2(clamp(roughness, 0.0, 1.0) * ${kLobeRows - 1}.0, angle * ${(kLobeViews - 1) / (Math.PI / 2)});
   ivec2 first = min(ivec2(place), ivec2(${kLobeRows - 2}, ${kLobeViews - 2}));
   vec2 share = place - vec2(first);
   return mix(
