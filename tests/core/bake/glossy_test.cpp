@@ -198,17 +198,19 @@ TEST(GlossyBake, PartsThatAutoSkipsAgainstMatricesEverywhere) {
   const auto all = bake(finished("column", small(R"(,"glossy":"on")"), kMetalKnot), {}, threads);
   ASSERT_TRUE(some && all);
   const BakedScene skipped = artefact_of(*some), forced = artefact_of(*all);
-  EXPECT_LT(2 * skipped.glossy.vertices.size(), forced.glossy.vertices.size());
+  EXPECT_LT(skipped.glossy.vertices.size(), forced.glossy.vertices.size());
   EXPECT_EQ(forced.glossy.vertices.size(), forced.scene.mesh.position.size());
   // The knot has the same matrices, but in other components: of each at most what report.json says, of a mirror.
   const double stored = std::hypot(report_of(*some)["glossy"]["compression"].get<double>(),
                                    report_of(*all)["glossy"]["compression"].get<double>());
   EXPECT_LT(difference(skipped, forced, [](const std::string& part) { return part == "knot"; }), 2 * stored);
   // The others are dielectrics of roughness 1. Their lobe returns E = .04 to .1 of what arrives, where the diffuse
-  // layer loses it: at albedo .25 to .75 they look up to E (1 - albedo) / albedo brighter. kMatte was measured.
-  constexpr double kMatte = 0.08;
-  EXPECT_LT(difference(skipped, forced, [](const std::string& part) { return part != "knot"; }), kMatte);
-  EXPECT_GT(difference(skipped, forced, [](const std::string& part) { return part != "knot"; }), 0);
+  // layer loses it: at albedo .25 to .75 they look up to E (1 - albedo) / albedo brighter, at the rims. Measured: .017.
+  constexpr double kMatte = 0.03;
+  const double matte = difference(skipped, forced, [](const std::string& part) { return part != "knot"; });
+  EXPECT_LT(matte, kMatte);
+  EXPECT_GT(matte, 0);
+  RecordProperty("matte", std::to_string(matte));
 }
 
 TEST(GlossyBake, VerticesOnBothSidesOfAContactLineHaveMatricesOfTheirOwnSide) {
@@ -219,13 +221,15 @@ TEST(GlossyBake, VerticesOnBothSidesOfAContactLineHaveMatricesOfTheirOwnSide) {
       bake(finished("column", small(), {{"floor", {{"metallicFactor", 1}, {"roughnessFactor", 0.5}}}}), {}, threads);
   ASSERT_TRUE(output);
   const BakedScene baked = artefact_of(*output);
-  const EyeLight light = eye_light(baked, {{2 * std::sqrt(std::numbers::pi_v<float>), 0, 0}}, false);
+  std::vector<Vec3f> constant(static_cast<std::size_t>(baked.glossy.outputs()));
+  constant[0].x = 2 * std::sqrt(std::numbers::pi_v<float>);
+  const LitComponents lit = light_components(baked.glossy, constant, false);
   std::map<std::array<float, 3>, std::vector<double>> arriving;  // of vertices at one place that face up, the constant
   for (std::size_t n = 0; n < baked.glossy.vertices.size(); ++n) {
     const auto v = baked.glossy.vertices[n];
     if (baked.scene.mesh.normal[v].y < 0.99F) continue;
     std::vector<Vec3d> coefficients(static_cast<std::size_t>(baked.glossy.outputs()));
-    incident_light(baked.glossy, light.lit, n, coefficients.data());
+    incident_light(baked.glossy, lit, n, coefficients.data());
     const Vec3f& p = baked.scene.mesh.position[v];
     arriving[{p.x, p.y, p.z}].push_back(coefficients[0].x);
   }
