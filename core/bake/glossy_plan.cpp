@@ -97,9 +97,10 @@ GlossyDecision plan_glossy(const Scene& scene, PrtStep::Glossy asked, int order)
   if (std::ranges::none_of(finish, [](const PartFinish& f) { return f.specular; })) {
     return {{},
             "skipped",
-            asked == Glossy::on ? "every part is unlit"
-                                : "no metal of roughness up to " + text(kGlossyMetal) + ", no other surface up to " +
-                                      text(kGlossyOther) + ": every surface is diffuse",
+            asked == Glossy::on
+                ? "every part is unlit"
+                : "no metal of roughness up to " + text(kGlossyMetal) + ", no other surface up to " +
+                      text(kGlossyOther) + ": every surface is diffuse (rougher metals at their full reflectance)",
             {}};
   }
   return decide(scene, finish, order,

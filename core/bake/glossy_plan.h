@@ -5,6 +5,10 @@
 // .02 of bands 1 to 3 are left), at .7 it still shows .34 of band 2. (A glTF material that says nothing is a metal of
 // roughness 1: it stays diffuse.) Other surfaces, which mirror 4 % straight on, up to roughness .4. A texture counts
 // where at least a hundredth of the part's triangles have such a finish at their centre.
+// What that skips, measured against `on` (the demo's floor, draft, overcast, all parts to random eyes): a dielectric of
+// roughness 1 1.7 %, of .45 4.9 %. Metals are another matter: 41 % at roughness .75, 95 % at 1. Most of that is level:
+// a lobe of single scattering loses up to .6 of what a rough metal reflects, and diffuse light of its full reflectance
+// none. `on` shows them as glTF's formula does.
 // Below roughness .4 a lobe keeps more than a third of band 5, the first that five bands leave out: the plan warns.
 
 #include <string>
