@@ -143,4 +143,30 @@ std::vector<float> StoredTransfer::read_back(std::size_t vertex, bool rounded) c
   return slots;
 }
 
+StoredGlossy::StoredGlossy(const GlossyTransfer& glossy, const Encoding& encoding,
+                           std::span<const std::uint32_t> vertices)
+    : glossy_(glossy), one_number_{1, 1, false, std::vector<float>(glossy.vertices.size(), 0.0F)} {
+  EXPECTS(glossy.weights.size() == glossy.rank() * glossy.vertices.size());
+  numbers_.emplace(one_number_,
+                   TransferEncoding{.bits = encoding.transfer.bits,
+                                    .components = glossy.components,
+                                    .weights = glossy.weights,
+                                    .weight_step = encoding.glossy_step},
+                   places(vertices));
+}
+
+std::vector<std::uint32_t> StoredGlossy::places(std::span<const std::uint32_t> vertices) const {
+  std::vector<std::uint32_t> out;
+  for (const auto v : vertices) {
+    if (has(v)) out.push_back(static_cast<std::uint32_t>(glossy_.find(v)));
+  }
+  return out;
+}
+
+std::vector<float> StoredGlossy::pack(std::size_t k, std::span<const std::uint32_t> vertices) const {
+  const std::vector<std::uint32_t> rows = places(vertices);
+  EXPECTS(rows.size() == vertices.size());
+  return numbers_->pack(k, rows);
+}
+
 }  // namespace kiln

@@ -174,4 +174,5 @@ export interface Report {
     seen?: { relrmse: number; interval?: [number, number] }; // at the points that can be seen, when some cannot
     job_light?: { relrmse: number; interval?: [number, number] }; // its own light in full detail, lamps and all
   };
+  glossy?: Partial<Record<'radiance' | 'transport' | 'truncation', { relrmse: number; interval?: [number, number] }>>;
 }

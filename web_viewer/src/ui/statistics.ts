@@ -12,6 +12,7 @@ export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   if (!report) return box;
   if (report.certificate?.relrmse !== undefined)
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
+  if (report.glossy?.radiance) box.append(h('h3', {}, 'Specular parts'), pairs(specular(report.glossy)));
   if (report.warnings?.length)
     box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
   if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
@@ -69,6 +70,15 @@ function certificate(c: NonNullable<Report['certificate']>, from: Report['error_
     h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval(c.interval)}`),
     pairs(rows),
   );
+}
+
+/// The certificate of matrices, with eyes all around.
+function specular({ radiance, transport, truncation }: NonNullable<Report['glossy']>): Row[] {
+  return [
+    ...(radiance ? [['Towards random eyes', withInterval(radiance)] as const] : []),
+    ...(transport ? [['from the bake', withInterval(transport)] as const] : []),
+    ...(truncation ? [['from the lobe cut by the order', withInterval(truncation)] as const] : []),
+  ];
 }
 
 function warnings(list: NonNullable<Report['warnings']>): HTMLElement {
