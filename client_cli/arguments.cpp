@@ -129,6 +129,15 @@ void add_plan(Program& program) {
   add_local(program, command.parser);
 }
 
+void add_albedo(CLI::App* parser, bool& scene) {
+  parser
+      ->add_option_function<std::string>(
+          "--albedo", [&scene](const std::string& word) { scene = word == "scene"; },
+          "radiance for albedo one, or as the scene's materials show it (to the eye of a point that has one)")
+      ->check(CLI::IsMember({"one", "scene"}))
+      ->type_name("one|scene");
+}
+
 void add_inspect(Program& program) {
   const auto command = add_command<InspectOptions>(program, "inspect", "What an artefact or a scene holds");
   command.parser->add_option("file", command.fields->file, "scene.glb of a bake, or any scene")
@@ -144,12 +153,10 @@ void add_eval(Program& program) {
       ->required()
       ->type_name("P.csv");
   add_light(command.parser, fields.light, kLightHelp + std::string("; the baked light when not given"));
-  command.parser
-      ->add_option_function<std::string>(
-          "--albedo", [&fields](const std::string& word) { fields.scene_albedo = word == "scene"; },
-          "radiance for albedo one, or as the scene's materials show it")
-      ->check(CLI::IsMember({"one", "scene"}))
-      ->type_name("one|scene");
+  command.parser->add_option("--sh-order", fields.sh_order, "only the first bands of the light; 0: all")
+      ->check(CLI::Range(0, 10))
+      ->type_name("N");
+  add_albedo(command.parser, fields.scene_albedo);
   command.parser->add_option("-o,--output", fields.output, "file instead of stdout")->type_name("FILE");
 }
 
@@ -173,12 +180,7 @@ void add_reference(Program& program) {
       ->type_name("N");
   command.parser->add_option("--seed", fields.seed, "of all random numbers")->type_name("N");
   command.parser->add_option("--threads", fields.threads, "0: all")->check(CLI::Range(0, 1024))->type_name("N");
-  command.parser
-      ->add_option_function<std::string>(
-          "--albedo", [&fields](const std::string& word) { fields.scene_albedo = word == "scene"; },
-          "radiance for albedo one, or as the scene's materials show it")
-      ->check(CLI::IsMember({"one", "scene"}))
-      ->type_name("one|scene");
+  add_albedo(command.parser, fields.scene_albedo);
   command.parser->add_option("-o,--output", fields.output, "file instead of stdout")->type_name("FILE");
 }
 
@@ -192,6 +194,7 @@ void add_compare(Program& program) {
       ->check(CLI::IsMember({"irradiance", "radiance"}))
       ->type_name("WORD");
   add_light(command.parser, fields.light, kLightHelp + std::string("; for artefacts; the baked light when not given"));
+  add_albedo(command.parser, fields.scene_albedo);
   command.parser->add_option("--count", fields.count, "points when both are artefacts")
       ->check(CLI::Range(1, 100'000'000))
       ->type_name("N");
@@ -204,6 +207,8 @@ void add_points(Program& program) {
   command.parser->add_option("input", fields.input, "scene or artefact")->required()->type_name("IN");
   command.parser->add_option("--count", fields.count, "how many")->check(CLI::Range(0, 100'000'000))->type_name("N");
   command.parser->add_option("--seed", fields.seed, "of the random numbers")->type_name("N");
+  command.parser->add_flag("--views", fields.views, "each with a random view direction");
+  command.parser->add_flag("--specular", fields.specular, "only where the artefact has matrices");
   command.parser->add_option("-o,--output", fields.output, "file instead of stdout")->type_name("P.csv");
 }
 

@@ -45,8 +45,9 @@ std::vector<Vec3f> common_light(const BakedScene& baked, const BakedScene& first
 }
 
 ValueTable values_at(const BakedScene& baked, const std::vector<QueryPoint>& points, const std::vector<Vec3f>& light,
-                     Threads& threads) {
-  return {points, artefact_values(baked, place_points(baked.scene, points, threads), light, {}), false};
+                     bool scene_albedo, Threads& threads) {
+  const Places places = place_points(baked.scene, points, threads);
+  return {points, artefact_values(baked, places, light, {scene_albedo, points}), false};
 }
 
 /// Both sides as tables over the same points: those of a table if there is one, else points drawn on A.
@@ -56,10 +57,11 @@ void fill_tables(Side& a, Side& b, const std::optional<Environment>& environment
   if (!first) return;
   const std::vector<QueryPoint> points = a.table   ? a.table->points
                                          : b.table ? b.table->points
-                                                   : draw_points(first->scene, options.count, options.seed);
+                                                   : draw_points(first->scene, {options.count, options.seed});
   for (Side* side : {&a, &b}) {
     if (side->baked)
-      side->table = values_at(*side->baked, points, common_light(*side->baked, *first, environment), threads);
+      side->table = values_at(*side->baked, points, common_light(*side->baked, *first, environment),
+                              options.scene_albedo, threads);
   }
 }
 

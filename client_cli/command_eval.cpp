@@ -32,8 +32,12 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
     return fail(ExitCode::usage, "not_relightable", "holds the light of one job (radiosity): leave out --env",
                 options.file);
   }
-  const std::vector<Vec3f> light =
+  std::vector<Vec3f> light =
       environment ? project_environment(*environment, baked.transfer.order) : baked.light.coefficients;
+  if (options.sh_order > 0) {
+    const auto kept = static_cast<std::size_t>(sh_count(options.sh_order));
+    for (std::size_t i = kept; i < light.size(); ++i) light[i] = {};
+  }
   if (!environment) {
     say(baked.transfer.order == 0 ? "the light of its job (radiosity)"
         : light.empty()           ? "the artefact's own lamps"
@@ -42,7 +46,7 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   Threads threads;
   const StopTogether together(session.interrupt, threads);
   const Places places = place_points(baked.scene, points, threads);
-  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo}), false};
+  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo, points}), false};
   return write_values(table, baked.scene.frame.scale, options.output, session);
 }
 

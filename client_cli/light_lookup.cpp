@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "core/artifact/evaluate.h"
+#include "core/artifact/eye.h"
+#include "core/bake/eye_material.h"
 #include "core/bake/surface_samples.h"
 #include "core/base/expects.h"
 #include "core/base/random.h"
@@ -81,21 +83,66 @@ struct Estimates {
   }
 };
 
-Estimates trace_batches(const Tracer& tracer, std::span<const ReferencePoint> points, const ReferenceLight& light,
-                        const TraceOptions& options, Threads& threads) {
+/// `trace` answers ReferenceOptions with the result of one batch.
+template <class Trace>
+Estimates trace_batches(std::size_t points, const TraceOptions& options, const Trace& trace) {
   const int batches = std::clamp(options.samples / kSmallestBatch, 1, kBatches);
   ReferenceOptions batch;
   batch.samples = std::max(2, (options.samples + batches - 1) / batches);
   batch.bounces = options.bounces;
   batch.from = options.from;
-  Estimates estimates(points.size());
+  Estimates estimates(points);
   for (int i = 0; i < batches; ++i) {
     batch.seed = mix64(options.seed ^ (std::uint64_t{0x7265666572} << 16)) + static_cast<std::uint64_t>(i);
-    const ReferenceResult result = trace_reference(tracer, points, light, batch, threads);
+    const ReferenceResult result = trace(batch);
     estimates.add(result.half_a);
     estimates.add(result.half_b);
   }
   return estimates;
+}
+
+const Vec3d* view_of(const LookupOptions& options, std::size_t point) {
+  if (!options.scene_albedo || point >= options.points.size() || !options.points[point].view) return nullptr;
+  return &*options.points[point].view;
+}
+
+/// Points with an eye, on the surface, and what they reflect to it.
+struct SeenPoints {
+  std::vector<std::size_t> index;  // of the query point; ascending
+  std::vector<EyedPoint> eyed;
+  std::vector<Vec3d> diffuse;  // (1 - metallic) albedo (1 - E)
+};
+
+SeenPoints seen_points(const Scene& scene, const Places& places, const LookupOptions& options) {
+  SeenPoints out;
+  std::optional<LobeTable> lobes;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Vec3d* view = view_of(options, i);
+    if (!view || !places[i]) continue;
+    if (!lobes) lobes = make_lobe_table(1);
+    const EyeMaterial material = eye_material(scene, surface_at(scene, *places[i]));
+    const Vec3d towards = normalized(*view);
+    const double nv = dot(match_normal(scene.mesh, *places[i]), towards);
+    const double kept = lobe_at(*lobes, nv, material.roughness).kept();
+    out.index.push_back(i);
+    out.eyed.push_back(
+        {reference_point(scene, *places[i]), to_float(towards), ggx_alpha(material.roughness), material.f0});
+    out.diffuse.push_back(material.diffuse * (1 - kept));
+  }
+  return out;
+}
+
+/// Radiance towards the eyes in place of that of an albedo.
+void show_to_eyes(const Scene& scene, const Places& places, const SeenPoints& seen, const Estimates& specular,
+                  std::vector<LightValue>& values) {
+  for (std::size_t k = 0; k < seen.index.size(); ++k) {
+    LightValue& value = values[seen.index[k]];
+    const Vec3d share = seen.diffuse[k] / std::numbers::pi, error = specular.standard_error(k);
+    const Vec3d below = share * value.irradiance_error;
+    value.radiance = share * value.irradiance + specular.mean[k] +
+                     to_double(emission_at(scene, surface_at(scene, *places[seen.index[k]])));
+    value.radiance_error = {std::hypot(below.x, error.x), std::hypot(below.y, error.y), std::hypot(below.z, error.z)};
+  }
 }
 
 }  // namespace
@@ -113,6 +160,7 @@ Places place_points(const Scene& scene, std::span<const QueryPoint> points, Thre
 std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& places, std::span<const Vec3f> light,
                                         const LookupOptions& options) {
   std::vector<LightValue> out;
+  const EyeLight seen = eye_light(baked, {light.begin(), light.end()}, true);
   for (const auto& place : places) {
     if (!place) {
       out.push_back(no_value());
@@ -122,6 +170,13 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
                               static_cast<float>(place->v)};
     const Vec3d value = to_double(value_at(baked.transfer, point, light));
     out.push_back(light_value(baked.scene, *place, value, {}, options.scene_albedo));
+    const Vec3d* view = view_of(options, out.size() - 1);
+    if (!view) continue;
+    const SurfacePoint surface = surface_at(baked.scene, *place);
+    const EyeRadiance radiance = eye_radiance(
+        baked, seen,
+        {point, match_normal(baked.scene.mesh, *place), normalized(*view), eye_material(baked.scene, surface)});
+    out.back().radiance = radiance.diffuse + radiance.specular + to_double(emission_at(baked.scene, surface));
   }
   return out;
 }
@@ -149,8 +204,10 @@ std::vector<LightValue> traced_values(const Scene& scene, const Places& places,
     if (place) points.push_back(reference_point(scene, *place));
   }
   const Tracer tracer(scene, threads);
-  const Estimates estimates =
-      trace_batches(tracer, points, reference_light(environment, options.sh_order), options, threads);
+  const ReferenceLight light = reference_light(environment, options.sh_order);
+  const Estimates estimates = trace_batches(points.size(), options, [&](const ReferenceOptions& batch) {
+    return trace_reference(tracer, points, light, batch, threads);
+  });
   std::vector<LightValue> out;
   std::size_t next = 0;
   for (const auto& place : places) {
@@ -159,16 +216,25 @@ std::vector<LightValue> traced_values(const Scene& scene, const Places& places,
       continue;
     }
     const Vec3d error = estimates.standard_error(next), value = estimates.mean[next++];
-    out.push_back(light_value(scene, *place, value, error, options.scene_albedo));
+    out.push_back(light_value(scene, *place, value, error, options.look.scene_albedo));
   }
+  const SeenPoints seen = seen_points(scene, places, options.look);
+  if (seen.eyed.empty()) return out;
+  const Estimates specular = trace_batches(seen.eyed.size(), options, [&](ReferenceOptions batch) {
+    batch.seed = mix64(batch.seed ^ 0x6579657373ULL);  // other paths than those of the light below
+    return trace_specular(tracer, seen.eyed, light, batch, threads);
+  });
+  show_to_eyes(scene, places, seen, specular, out);
   return out;
 }
 
-std::vector<QueryPoint> draw_points(const Scene& scene, std::size_t count, std::uint64_t seed) {
+std::vector<QueryPoint> draw_points(const Scene& scene, const PointDraw& draw) {
   std::vector<QueryPoint> points;
-  for (const SurfaceSample& sample : sample_surface(scene.mesh, count, seed)) {
+  for (const SurfaceSample& sample : sample_surface(scene.mesh, draw.count, draw.seed, draw.density)) {
     const SurfaceMatch place{sample.triangle, sample.u, sample.v, 0};
     points.push_back({scene.frame.to_world(match_position(scene.mesh, place)), match_normal(scene.mesh, place)});
+    Random random(draw.seed, points.size() - 1, 0x65796573ULL);
+    if (draw.views) points.back().view = random_view(points.back().normal, random);
   }
   return points;
 }

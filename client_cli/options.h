@@ -72,6 +72,7 @@ struct EvalOptions {
   std::string file, points, output;
   LightOptions light;
   bool scene_albedo = false;
+  int sh_order = 0;
 };
 struct TruthOptions {
   std::string input, points, output;
@@ -86,11 +87,13 @@ struct CompareOptions {
   std::optional<double> max_error;
   std::string column = "irradiance";
   LightOptions light;
+  bool scene_albedo = false;
   std::uint64_t count = 4000, seed = 0;
 };
 struct PointsOptions {
   std::string input, output;
   std::uint64_t count = 1000, seed = 0;
+  bool views = false, specular = false;
 };
 struct PresetsOptions {};
 struct DemoSceneOptions {

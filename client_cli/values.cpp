@@ -38,9 +38,20 @@ Vec3d three_of(const std::vector<double>& row, const std::array<std::size_t, 3>&
 Outcome<std::vector<QueryPoint>> points_of(const CsvTable& table, const std::string& path) {
   KILN_TRY(position, find_three(table, {"x", "y", "z"}, path));
   KILN_TRY(normal, find_three(table, {"nx", "ny", "nz"}, path));
+  std::array<std::size_t, 3> view{};
+  const bool has_view = table.find("vx") || table.find("vy") || table.find("vz");
+  if (has_view) {
+    KILN_TRY(found, find_three(table, {"vx", "vy", "vz"}, path));
+    view = found;
+  }
   std::vector<QueryPoint> points;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
-    points.push_back({three_of(table.rows[i], position), three_of(table.rows[i], normal)});
+    points.push_back({three_of(table.rows[i], position), three_of(table.rows[i], normal), std::nullopt});
+    if (has_view) points.back().view = three_of(table.rows[i], view);
+    if (has_view && !(is_finite(*points.back().view) && length(*points.back().view) > 0)) {
+      return fail(ExitCode::rejected, "not_finite", "the view direction must be finite and not zero",
+                  path + ": line " + std::to_string(table.lines[i]));
+    }
     if (is_finite(points.back().position) && is_finite(points.back().normal)) continue;
     return fail(ExitCode::rejected, "not_finite", "position and normal must be finite numbers",
                 path + ": line " + std::to_string(table.lines[i]));
@@ -67,12 +78,21 @@ json rgb_json(const Vec3d& v) {
 }
 
 json point_json(const QueryPoint& point) {
-  return {{"position", {point.position.x, point.position.y, point.position.z}},
-          {"normal", {point.normal.x, point.normal.y, point.normal.z}}};
+  json out = {{"position", {point.position.x, point.position.y, point.position.z}},
+              {"normal", {point.normal.x, point.normal.y, point.normal.z}}};
+  if (point.view) out["view"] = {point.view->x, point.view->y, point.view->z};
+  return out;
 }
 
-std::string names_line(bool errors) {
-  std::string line = "x,y,z,nx,ny,nz";
+/// A file has views for all of its points or for none.
+bool have_views(const std::vector<QueryPoint>& points) { return !points.empty() && points[0].view; }
+
+std::string point_names(const std::vector<QueryPoint>& points) {
+  return have_views(points) ? "x,y,z,nx,ny,nz,vx,vy,vz" : "x,y,z,nx,ny,nz";
+}
+
+std::string names_line(const std::vector<QueryPoint>& points, bool errors) {
+  std::string line = point_names(points);
   const auto add = [&](const std::string& name) {
     for (const auto& channel : channel_names(name)) line += "," + channel;
   };
@@ -95,10 +115,11 @@ Outcome<std::vector<QueryPoint>> read_points(const std::string& path) {
 }
 
 std::string points_csv(const std::vector<QueryPoint>& points) {
-  std::string out = "x,y,z,nx,ny,nz\n";
+  std::string out = point_names(points) + "\n";
   for (const QueryPoint& point : points) {
     append(out, point.position);
     append_value(out, point.normal);
+    if (point.view) append_value(out, *point.view);
     out += '\n';
   }
   return out;
@@ -137,11 +158,12 @@ Outcome<ValueTable> read_values(const std::string& path) {
 }
 
 std::string values_csv(const ValueTable& table) {
-  std::string out = names_line(table.has_errors);
+  std::string out = names_line(table.points, table.has_errors);
   for (std::size_t i = 0; i < table.points.size(); ++i) {
     const LightValue& value = table.values[i];
     append(out, table.points[i].position);
     append(out, table.points[i].normal);
+    if (table.points[i].view) append(out, *table.points[i].view);
     append_value(out, value.irradiance);
     append_value(out, value.radiance);
     out += "," + number_text(static_cast<float>(value.distance));

@@ -2,11 +2,12 @@
 // Points on surfaces, and light at them: the CSV that points, eval, reference and compare pass to each other.
 //
 //   x,y,z,nx,ny,nz[,vx,vy,vz]                                              points: world position, normal, view
-//   direction x,y,z,nx,ny,nz,irradiance_r,_g,_b,radiance_r,_g,_b,distance            values of eval
+//   x,y,z,nx,ny,nz[,vx,vy,vz],irradiance_r,_g,_b,radiance_r,_g,_b,distance   values of eval
 //   ... ,irradiance_se_r,_g,_b,radiance_se_r,_g,_b                         and of reference: standard errors
 // irradiance is W m^-2; radiance W m^-2 sr^-1; distance is how far the point lay from the surface, in world units.
 // A point without a surface of compatible normal has nan in every value (null in JSON).
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@
 namespace kiln {
 
 struct QueryPoint {
-  Vec3d position, normal;  // world; the normal need not be unit
+  Vec3d position, normal;     // world; the normal need not be unit
+  std::optional<Vec3d> view;  // towards an eye, not zero: with --albedo scene radiance is what it sees
 };
 
 struct LightValue {

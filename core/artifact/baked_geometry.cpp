@@ -124,6 +124,14 @@ class PrimitiveBuilder {
     }
   }
 
+  /// Of a part whose vertices have matrices.
+  void add_matrices(const StoredGlossy& glossy) {
+    for (std::size_t k = 0; glossy.has(vertices_[0]) && k < glossy.vec4s(); ++k) {
+      add({glossy_name(k), true, false},
+          {StreamKind::generic, 4, glossy.bits(k), {-1, -1, -1, -1}, 2, glossy.pack(k, vertices_)});
+    }
+  }
+
   PartPrimitive take() { return std::move(out_); }
 
  private:
@@ -180,6 +188,7 @@ Result<void> visit_part_primitives(const BakedScene& baked, const GeometryOption
     builder.add_geometry(options.encoding);
     builder.add_colors(colors);
     if (options.transfer) builder.add_coefficients(*options.transfer);
+    if (options.glossy) builder.add_matrices(*options.glossy);
     if (auto done = visit(builder.take()); !done) return done;
   }
   return {};

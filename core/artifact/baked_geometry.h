@@ -33,6 +33,7 @@ std::vector<std::uint32_t> used_vertices(const Mesh&);
 struct GeometryOptions {
   Encoding encoding;
   const StoredTransfer* transfer = nullptr;  // null leaves the coefficients out (to measure sizes)
+  const StoredGlossy* glossy = nullptr;      // null: there are no matrices, or they are left out
 };
 
 /// Takes one part at a time, so that no more than one part's streams are in memory. A fault ends the visit.

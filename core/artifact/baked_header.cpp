@@ -1,5 +1,6 @@
 #include "core/artifact/baked_header.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -69,13 +70,13 @@ Transfer read_shape(const Fields& extension, Findings& findings) {
   return out;
 }
 
-void check_attribute_names(const Fields& extension, const Transfer& shape, std::size_t numbers, Findings& findings) {
+/// `name_of(k)` is that of VEC4 k.
+void check_attribute_names(const Fields& extension, const auto& name_of, std::size_t numbers, Findings& findings) {
   const std::vector<std::string> names = extension.texts("attributes");
   bool right = names.size() == vec4s_of(numbers);
-  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == stored_name(shape, k);
+  for (std::size_t k = 0; right && k < names.size(); ++k) right = names[k] == name_of(k);
   if (!right) {
-    findings.fail("slot_count_mismatch",
-                  "The attributes must be _PRT_0 and on (of order 0: _RADIOSITY), four numbers in each.",
+    findings.fail("slot_count_mismatch", "The attributes must be " + name_of(0) + " and on, four numbers in each.",
                   extension.pointer("attributes"));
   }
 }
@@ -97,10 +98,43 @@ void read_form(const json& root, const Fields& extension, BakedHeader& out, Find
     return;
   }
   const std::size_t count = out.form.expected_count(out.shape);
-  check_attribute_names(extension, out.shape, count, findings);
+  check_attribute_names(
+      extension, [&](std::size_t k) { return stored_name(out.shape, k); }, count, findings);
   const std::string scale = std::string(kPlace) + "/scale", offset = std::string(kPlace) + "/offset";
   out.form.scale = numbers(at(root, scale), scale, count, findings);
   out.form.offset = numbers(at(root, offset), offset, count, findings);
+}
+
+/// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.
+void read_glossy(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+  if (!extension.has("glossy")) return;
+  const Fields glossy = extension.object("glossy"), components = glossy.object("components"),
+               lobes = glossy.object("lobes");
+  const std::uint64_t order = glossy.count("order", 0), channels = glossy.count("channels", 0);
+  const auto most = static_cast<std::uint64_t>(std::min(out.shape.order, kMaxLobeOrder));
+  if (order < 1 || order > most || (channels != 1 && channels != 3)) {
+    return findings.fail("number_out_of_range",
+                         "Matrices have 1 or 3 channels and an order of at most 5 and that of the transfer vectors.",
+                         glossy.pointer("order"));
+  }
+  GlossyTransfer shape{static_cast<int>(order), static_cast<int>(channels), glossy.flag("fixed", false), {}, {}, {}};
+  const std::uint64_t rank = components.count("rank", 0);
+  if (rank < 1 || rank > shape.stride()) {
+    return findings.fail("number_out_of_range", "There must be at least one component, and no more than numbers.",
+                         components.pointer("rank"));
+  }
+  if (lobes.count("rows", 0) != kLobeRows || lobes.count("views", 0) != kLobeViews) {
+    return findings.fail("slot_count_mismatch", "The table of lobes must have 16 rows of 32 views.",
+                         lobes.pointer("rows"));
+  }
+  shape.components = {shape.stride(), std::vector<float>((rank + 1) * shape.stride())};
+  out.glossy_view = components.index("bufferView", 1u << 30);
+  out.lobes_view = lobes.index("bufferView", 1u << 30);
+  check_attribute_names(glossy, glossy_name, rank, findings);
+  const std::string place = std::string(kPlace) + "/glossy";
+  out.glossy_form.scale = numbers(at(root, place + "/scale"), place + "/scale", rank, findings);
+  out.glossy_form.offset = numbers(at(root, place + "/offset"), place + "/offset", rank, findings);
+  out.glossy = std::move(shape);
 }
 
 BakedLight read_light(const json& root, const Fields& extension, int order, Findings& findings) {
@@ -138,7 +172,7 @@ std::vector<BakedHeader::PartHeader> read_parts(const json& root, Findings& find
       return;
     }
     const Fields part = primitive.extension(kExtension);
-    out.push_back({part.text("name"), part.index("material", 1u << 30)});
+    out.push_back({part.text("name"), part.index("material", 1u << 30), part.flag("glossy", false)});
   });
   return out;
 }
@@ -157,6 +191,7 @@ BakedHeader read_baked_header(std::span<const std::uint8_t> text, Findings& find
   out.shape = read_shape(extension, findings);
   if (findings.failed()) return out;
   read_form(root, extension, out, findings);
+  read_glossy(root, extension, out, findings);
   out.light = read_light(root, extension, out.shape.order, findings);
   out.exposure = read_exposure(extension, findings);
   const json& provenance = at(root, "/asset/extras/kiln");

@@ -15,11 +15,15 @@ namespace kiln {
 struct BakedHeader {
   struct PartHeader {
     std::string name;
-    int material = 0;  // checked against the materials by the caller
+    int material = 0;     // checked against the materials by the caller
+    bool glossy = false;  // its vertices have matrices
   };
   Transfer shape;            // order, channels, fixed; no coefficients
   StoredForm form;           // of components only the shape: their numbers are in a buffer view
   int components_view = -1;  // checked against the buffer views by the caller; -1: raw
+  GlossyTransfer glossy;     // its shape; of rank 0 (and order 0) where there are no matrices
+  StoredForm glossy_form;
+  int glossy_view = -1, lobes_view = -1;  // checked as components_view
   BakedLight light;
   float exposure = 1;
   std::string provenance;

@@ -9,6 +9,8 @@
 #include "core/artifact/import.h"
 #include "core/base/result.h"
 #include "core/prt/components.h"
+#include "core/prt/glossy_transfer.h"
+#include "core/prt/lobe_table.h"
 #include "core/prt/transfer.h"
 #include "core/scene/scene.h"
 
@@ -21,8 +23,10 @@ struct BakedLight {
 };
 
 struct BakedScene {
-  Scene scene;        // final geometry and the original materials, textures and lights
-  Transfer transfer;  // of scene.mesh's vertices
+  Scene scene;            // final geometry and the original materials, textures and lights
+  Transfer transfer;      // of scene.mesh's vertices
+  GlossyTransfer glossy;  // of whole parts: all of a part's vertices have matrices, or none
+  LobeTable lobes;        // of glossy.order, where there are matrices
   BakedLight light;
   float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
@@ -34,6 +38,7 @@ struct TransferEncoding {
   Components components;       // none: raw
   std::vector<float> weights;  // of the components, rank for each vertex
   double weight_step = 0;      // weights are rounded to steps of at most this; 0: to `bits`
+  double lamp_step = 0;        // the light of lamps likewise: near a lamp it may be a thousand times its mean
 };
 
 struct Encoding {
@@ -41,7 +46,9 @@ struct Encoding {
   int normal_bits = 12;
   int texcoord_bits = 14;
   TransferEncoding transfer;
-  int speed = 7;  // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
+  bool glossy = true;      // false leaves the matrices out (to measure sizes)
+  double glossy_step = 0;  // weights of matrices are rounded to steps of at most this; 0: to transfer.bits
+  int speed = 7;           // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
 };
 
 /// The bytes of a GLB. Draco reorders vertices: what read_baked_glb gives back is the delivered order.
@@ -53,7 +60,8 @@ Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
 /// accessor_count_mismatch, or as import_scene does.
 Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
 
-/// Decodes the images that base colour and emission textures name. One that cannot be decoded keeps empty pixels.
+/// Decodes the images that base colour, emission and metallic-roughness textures name. One that cannot be decoded keeps
+/// empty pixels.
 void decode_pixels(Scene&);
 
 }  // namespace kiln

@@ -5,7 +5,7 @@
 namespace kiln::gltf {
 namespace {
 
-/// Which images a bake looks at: those behind base colours and emissions.
+/// Which images a bake looks at: those behind base colours, emissions, metalness and roughness.
 std::vector<bool> needed_images(const Document& d) {
   std::vector<bool> needed(d.images.size());
   const auto mark = [&](const TextureRef& ref) {
@@ -15,6 +15,7 @@ std::vector<bool> needed_images(const Document& d) {
   for (const Material& m : d.materials) {
     mark(m.base_color_texture);
     mark(m.emission_texture);
+    mark(m.metallic_roughness_texture);
   }
   return needed;
 }

@@ -26,6 +26,7 @@ struct BakedFile {
   const gltf::Document& document;
   const gltf::BufferBytes& bytes;
   const BakedHeader& header;
+  const LobeTable& lobes;
 };
 
 std::string primitive_place(std::size_t mesh, std::size_t i) {
@@ -153,6 +154,23 @@ void read_coefficients(const BakedFile& file, StreamReader& streams, std::size_t
     slots_of(form, out, &numbers[v * count], &out.coefficients[(first + v) * out.stride()]);
 }
 
+/// Weights of the part's matrices, and which vertices they belong to.
+void read_matrices(const BakedFile& file, StreamReader& streams, std::size_t first, std::size_t vertices,
+                   GlossyTransfer& out) {
+  const StoredForm& form = file.header.glossy_form;
+  const std::size_t rank = out.rank(), before = out.vertices.size();
+  for (std::size_t v = 0; v < vertices; ++v) out.vertices.push_back(static_cast<std::uint32_t>(first + v));
+  out.weights.resize(out.vertices.size() * rank);
+  for (std::size_t k = 0; k < vec4s_of(rank); ++k) {
+    const std::vector<float> stored = streams.take(glossy_name(k), 4);
+    for (std::size_t j = 4 * k; j < std::min(4 * k + 4, rank); ++j) {
+      for (std::size_t v = 0; v < vertices; ++v)
+        out.weights[(before + v) * rank + j] =
+            static_cast<float>(form.offset[j] + form.scale[j] * static_cast<double>(stored[4 * v + j - 4 * k]));
+    }
+  }
+}
+
 void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& findings) {
   DecodedMesh decoded = decode_part(file, i, findings);
   if (findings.failed()) return;
@@ -176,6 +194,7 @@ void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& 
   if (part.has_tangent) append_optional(mesh.tangent, first, streams.take("TANGENT", 4));
   if (part.has_color) append_optional(mesh.color, first, streams.take_id(color, "COLOR_0", 4));
   read_coefficients(file, streams, first, vertices, out.transfer);
+  if (header.glossy) read_matrices(file, streams, first, vertices, out.glossy);
   check_geometry(mesh, first, place, findings);
   out.scene.parts.push_back(part);
 }
@@ -238,6 +257,9 @@ void check_shape(const gltf::Document& d, const BakedHeader& header, Findings& f
   const bool mirrored = d.meshes.size() == 2 && d.roots.size() == 1 && !d.meshes[0].primitives.empty() &&
                         d.meshes[0].primitives.size() == d.meshes[1].primitives.size() &&
                         d.meshes[0].primitives.size() == header.parts.size();
+  const bool any_matrix = std::ranges::any_of(header.parts, [](const auto& part) { return part.glossy; });
+  if (any_matrix != bool{header.glossy})
+    findings.fail("not_a_baked_scene", "Parts with matrices and the root's description of them go together.");
   if (!mirrored) findings.fail("not_a_baked_scene", "A baked scene has two meshes with one primitive for each part.");
   for (std::size_t i = 0; i < header.parts.size(); ++i) {
     const int material = header.parts[i].material;
@@ -249,6 +271,8 @@ void check_shape(const gltf::Document& d, const BakedHeader& header, Findings& f
 BakedScene read_scene(const BakedFile& file, Findings& findings) {
   BakedScene out;
   out.transfer = file.header.shape;
+  out.glossy = file.header.glossy;
+  out.lobes = file.lobes;
   out.light = file.header.light;
   out.exposure = file.header.exposure;
   out.provenance = file.header.provenance;
@@ -259,23 +283,42 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   if (!std::ranges::all_of(out.transfer.coefficients, [](float c) { return std::isfinite(c); })) {
     findings.fail("number_out_of_range", "A coefficient does not fit a float.");
   }
+  if (!std::ranges::all_of(out.glossy.weights, [](float w) { return std::isfinite(w); }))
+    findings.fail("number_out_of_range", "A weight of a matrix does not fit a float.");
   read_look(file, out.scene);
   return out;
 }
 
+/// Fills `out` from a buffer view of just that many finite floats.
+void read_floats(const gltf::BufferBytes& bytes, int index, const std::string& place, std::vector<float>& out,
+                 Findings& findings) {
+  const auto view = static_cast<std::size_t>(index);
+  if (index < 0 || view >= bytes.views.size() || bytes.views[view].size() != out.size() * sizeof(float)) {
+    findings.fail("slot_count_mismatch", "The buffer view does not hold just these numbers.", place);
+    return;
+  }
+  std::memcpy(out.data(), bytes.views[view].data(), out.size() * sizeof(float));
+  if (!std::ranges::all_of(out, [](float x) { return std::isfinite(x); }))
+    findings.fail("number_out_of_range", "A number is not finite.", place);
+}
+
+constexpr const char* kExtensionPlace = "/extensions/KILN_radiance_transfer";
+
 /// Fills the rows that the header names.
 void read_components(const gltf::BufferBytes& bytes, BakedHeader& header, Findings& findings) {
   if (header.components_view < 0) return;
-  std::vector<float>& rows = header.form.components.rows;
-  const auto view = static_cast<std::size_t>(header.components_view);
-  const std::string place = "/extensions/KILN_radiance_transfer/components/bufferView";
-  if (view >= bytes.views.size() || bytes.views[view].size() != rows.size() * sizeof(float)) {
-    findings.fail("slot_count_mismatch", "The buffer view does not hold the mean and the components.", place);
-    return;
-  }
-  std::memcpy(rows.data(), bytes.views[view].data(), rows.size() * sizeof(float));
-  if (!std::ranges::all_of(rows, [](float x) { return std::isfinite(x); }))
-    findings.fail("number_out_of_range", "A component is not finite.", place);
+  const std::string place = std::string(kExtensionPlace) + "/components/bufferView";
+  read_floats(bytes, header.components_view, place, header.form.components.rows, findings);
+}
+
+/// The same for the matrices; returns the table of lobes that belongs to them.
+LobeTable read_glossy(const gltf::BufferBytes& bytes, BakedHeader& header, Findings& findings) {
+  if (!header.glossy) return {};
+  const std::string place = std::string(kExtensionPlace) + "/glossy/";
+  read_floats(bytes, header.glossy_view, place + "components/bufferView", header.glossy.components.rows, findings);
+  LobeTable lobes{header.glossy.order, std::vector<float>(LobeTable::size_of(header.glossy.order))};
+  read_floats(bytes, header.lobes_view, place + "lobes/bufferView", lobes.numbers, findings);
+  return lobes;
 }
 
 BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
@@ -293,14 +336,17 @@ BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   if (findings.failed()) return {};
   read_components(bytes, header, findings);
   if (findings.failed()) return {};
-  return read_scene({document, bytes, header}, findings);
+  const LobeTable lobes = read_glossy(bytes, header, findings);
+  if (findings.failed()) return {};
+  return read_scene({document, bytes, header, lobes}, findings);
 }
 
 /// Which images the bake looks at.
 std::vector<bool> shaded_images(const Scene& scene) {
   std::vector<bool> out(scene.images.size(), false);
   for (const Material& m : scene.materials) {
-    for (const int texture : {m.base_color_texture.texture, m.emission_texture.texture}) {
+    for (const int texture :
+         {m.base_color_texture.texture, m.emission_texture.texture, m.metallic_roughness_texture.texture}) {
       const int image = texture < 0 ? -1 : scene.textures[static_cast<std::size_t>(texture)].image;
       if (image >= 0) out[static_cast<std::size_t>(image)] = true;
     }

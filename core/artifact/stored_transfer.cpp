@@ -87,18 +87,32 @@ void StoredTransfer::measure_ranges(std::span<const std::uint32_t> vertices) {
   }
 }
 
-/// As many levels as give weights steps of at most `weight_step`; `bits` where none is asked for, and for lamps.
+bool StoredTransfer::is_lamp(std::size_t number) const {
+  if (!transfer_.fixed) return false;
+  if (!form_.raw()) return number >= form_.components.rank();
+  const auto slots = static_cast<std::size_t>(transfer_.slots());
+  return number % slots == slots - 1;
+}
+
+/// As many levels as give weights steps of at most `weight_step` and lamps of at most `lamp_step`; `bits` where none is
+/// asked for.
 void StoredTransfer::choose_bits(const TransferEncoding& encoding) {
   const std::size_t rank = form_.raw() ? 0 : form_.components.rank();
-  bits_.assign(vec4s_of(form_.count()), encoding.bits);
-  for (std::size_t k = 0; k < bits_.size() && 4 * k < rank && encoding.weight_step > 0; ++k) {
-    const std::size_t end = std::min(4 * k + 4, rank);
+  const auto bits_for = [](double half_range, double step) {
+    const double bits = std::ceil(std::log2(2 * half_range / step + 1));
+    return static_cast<int>(std::clamp<double>(bits, kFewestBits, kMostBits));
+  };
+  for (std::size_t k = 0; k < vec4s_of(form_.count()); ++k) {
+    const std::size_t first = 4 * k, end = std::min(first + 4, form_.count()), weights = std::min(end, rank);
+    int bits = kFewestBits;
     double widest = 0;
-    for (std::size_t j = 4 * k; j < end; ++j) widest = std::max(widest, form_.scale[j]);
-    const double bits = std::ceil(std::log2(2 * widest / encoding.weight_step + 1));
-    const bool lamps_too = end < std::min(4 * k + 4, form_.count());
-    bits_[k] = static_cast<int>(std::clamp<double>(bits, lamps_too ? encoding.bits : kFewestBits, kMostBits));
-    for (std::size_t j = 4 * k; j < end; ++j) {
+    for (std::size_t j = first; j < end; ++j) {
+      const double step = is_lamp(j) ? encoding.lamp_step : j < rank ? encoding.weight_step : 0;
+      bits = std::max(bits, step > 0 ? bits_for(form_.scale[j], step) : encoding.bits);
+      if (j < rank) widest = std::max(widest, form_.scale[j]);
+    }
+    bits_.push_back(bits);
+    for (std::size_t j = first; j < weights && encoding.weight_step > 0; ++j) {
       if (form_.scale[j] > 0) form_.scale[j] = widest;  // equal steps in all four
     }
   }
@@ -127,6 +141,32 @@ std::vector<float> StoredTransfer::read_back(std::size_t vertex, bool rounded) c
   }
   slots_of(form_, transfer_, numbers.data(), slots.data());
   return slots;
+}
+
+StoredGlossy::StoredGlossy(const GlossyTransfer& glossy, const Encoding& encoding,
+                           std::span<const std::uint32_t> vertices)
+    : glossy_(glossy), one_number_{1, 1, false, std::vector<float>(glossy.vertices.size(), 0.0F)} {
+  EXPECTS(glossy.weights.size() == glossy.rank() * glossy.vertices.size());
+  numbers_.emplace(one_number_,
+                   TransferEncoding{.bits = encoding.transfer.bits,
+                                    .components = glossy.components,
+                                    .weights = glossy.weights,
+                                    .weight_step = encoding.glossy_step},
+                   places(vertices));
+}
+
+std::vector<std::uint32_t> StoredGlossy::places(std::span<const std::uint32_t> vertices) const {
+  std::vector<std::uint32_t> out;
+  for (const auto v : vertices) {
+    if (has(v)) out.push_back(static_cast<std::uint32_t>(glossy_.find(v)));
+  }
+  return out;
+}
+
+std::vector<float> StoredGlossy::pack(std::size_t k, std::span<const std::uint32_t> vertices) const {
+  const std::vector<std::uint32_t> rows = places(vertices);
+  EXPECTS(rows.size() == vertices.size());
+  return numbers_->pack(k, rows);
 }
 
 }  // namespace kiln

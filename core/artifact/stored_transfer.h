@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ namespace kiln {
 inline std::string stored_name(const Transfer& shape, std::size_t k) {
   return shape.order == 0 ? "_RADIOSITY" : "_PRT_" + std::to_string(k);
 }
+inline std::string glossy_name(std::size_t k) { return "_GLOSSY_" + std::to_string(k); }
 
 inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
 
@@ -58,11 +60,33 @@ class StoredTransfer {
   const float* numbers_of(std::size_t vertex) const;
   void measure_ranges(std::span<const std::uint32_t> vertices);
   void choose_bits(const TransferEncoding&);
+  bool is_lamp(std::size_t number) const;
 
   const Transfer& transfer_;
   StoredForm form_;
   std::vector<float> weights_;  // of components, count() for each vertex; raw numbers are the coefficients
   std::vector<int> bits_;       // of each VEC4
+};
+
+/// Weights of matrices on their way into a file: stored like those of transfer vectors.
+class StoredGlossy {
+ public:
+  /// `vertices` as above; those that have no matrix do not count, and at least one has.
+  StoredGlossy(const GlossyTransfer&, const Encoding&, std::span<const std::uint32_t> vertices);
+
+  std::size_t vec4s() const { return vec4s_of(glossy_.rank()); }
+  const StoredForm& form() const { return numbers_->form(); }
+  int bits(std::size_t vec4) const { return numbers_->bits(vec4); }
+  bool has(std::uint32_t vertex) const { return glossy_.find(vertex) != GlossyTransfer::kNoMatrix; }
+  /// The normalised numbers 4k .. 4k+3 of vertices that have matrices.
+  std::vector<float> pack(std::size_t k, std::span<const std::uint32_t> vertices) const;
+
+ private:
+  std::vector<std::uint32_t> places(std::span<const std::uint32_t> vertices) const;
+
+  const GlossyTransfer& glossy_;
+  Transfer one_number_;  // stands for the matrices' vertices
+  std::optional<StoredTransfer> numbers_;
 };
 
 }  // namespace kiln

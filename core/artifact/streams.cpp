@@ -56,7 +56,15 @@ Result<std::vector<StreamBytes>> stream_bytes(const BakedScene& baked, const Enc
   std::uint64_t known = images + (file.size() - chunks.binary.size());
   for (const StreamBytes& row : rows) known += row.bytes;
   EXPECTS(known <= file.size());
-  rows.push_back({"coefficients", file.size() - known});
+  std::uint64_t matrices = 0;
+  if (baked.glossy) {
+    Encoding without = encoding;
+    without.glossy = false;
+    KILN_TRY(plain, write_baked_glb(baked, without));
+    matrices = file.size() - std::min(file.size(), plain.size());
+  }
+  rows.push_back({"coefficients", file.size() - known - matrices});
+  if (matrices > 0) rows.push_back({"matrices", matrices});
   rows.push_back({"images", images});
   rows.push_back({"JSON and headers", file.size() - chunks.binary.size()});
   return rows;

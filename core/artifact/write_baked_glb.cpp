@@ -33,6 +33,12 @@ void check_shape(const BakedScene& baked) {
   EXPECTS(baked.transfer.vertices() == mesh.position.size() && mesh.normal.size() == mesh.position.size());
   EXPECTS(mesh.part.size() == mesh.triangles.size());
   EXPECTS(std::isnormal(baked.exposure) && baked.exposure > 0);
+  const GlossyTransfer& glossy = baked.glossy;
+  if (glossy) {
+    EXPECTS(glossy.order <= std::min(baked.transfer.order, kMaxLobeOrder));
+    EXPECTS(baked.lobes.order == glossy.order && baked.lobes.numbers.size() == LobeTable::size_of(glossy.order));
+    EXPECTS(!glossy.vertices.empty() && glossy.rank() >= 1 && glossy.components.stride == glossy.stride());
+  }
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -45,9 +51,13 @@ class Writer {
     const auto vertices = used_vertices(baked_.scene.mesh);
     if (vertices.empty()) return fault("nothing_to_write", "The baked scene has no triangle.");
     transfer_.emplace(baked_.transfer, encoding_.transfer, vertices);
+    const auto has_matrix = [&](auto v) { return baked_.glossy.find(v) != GlossyTransfer::kNoMatrix; };
+    if (baked_.glossy && encoding_.glossy && std::ranges::any_of(vertices, has_matrix))
+      glossy_.emplace(baked_.glossy, encoding_, vertices);
     if (const auto done = add_parts(); !done) return tl::make_unexpected(done.error());
     add_images();
     add_components();
+    add_glossy();
     std::string text = document().dump(-1, ' ', false, json::error_handler_t::replace);
     return join_glb(std::move(text), std::move(binary_));
   }
@@ -72,13 +82,14 @@ class Writer {
   }
 
   Result<void> add_parts() {
-    return visit_part_primitives(baked_, {encoding_, &*transfer_}, [this](PartPrimitive part) -> Result<void> {
-      const std::size_t triangles = part.mesh.triangles.size();
-      KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
-      KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), triangles, true}));
-      add_primitives(part, decoded, add_view(bytes));
-      return {};
-    });
+    return visit_part_primitives(
+        baked_, {encoding_, &*transfer_, glossy_ ? &*glossy_ : nullptr}, [this](PartPrimitive part) -> Result<void> {
+          const std::size_t triangles = part.mesh.triangles.size();
+          KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
+          KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), triangles, true}));
+          add_primitives(part, decoded, add_view(bytes));
+          return {};
+        });
   }
 
   /// An accessor without a buffer view, as the Draco extension asks; counts and bounds are those of the decoded data.
@@ -118,6 +129,7 @@ class Writer {
     const PartLook look = part_look(baked_.scene, part);
     baked["extensions"][kTransfer] = {
         {"name", part.name}, {"material", material}, {"albedo", vec(look.albedo)}, {"emission", vec(look.emission)}};
+    if (baked_attributes.contains(glossy_name(0))) baked["extensions"][kTransfer]["glossy"] = true;
     json original = primitive_json(original_attributes, original_ids, add_view_again(view), indices);
     original["material"] = material;
     baked_primitives_.push_back(std::move(baked));
@@ -145,8 +157,33 @@ class Writer {
   void add_components() {
     const std::vector<float>& rows = transfer_->form().components.rows;
     if (rows.empty()) return;
+    components_ = add_floats(rows);
+  }
+
+  /// The components of the matrices, and the table of lobes.
+  void add_glossy() {
+    if (!glossy_) return;
+    glossy_rows_ = add_floats(baked_.glossy.components.rows);
+    lobes_ = add_floats(baked_.lobes.numbers);
+  }
+
+  std::size_t add_floats(const std::vector<float>& numbers) {
     static_assert(std::endian::native == std::endian::little);
-    components_ = add_view({reinterpret_cast<const std::uint8_t*>(rows.data()), rows.size() * sizeof(float)});
+    return add_view({reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size() * sizeof(float)});
+  }
+
+  json glossy_extension() const {
+    const GlossyTransfer& g = baked_.glossy;
+    json attributes = json::array();
+    for (std::size_t k = 0; k < glossy_->vec4s(); ++k) attributes.push_back(glossy_name(k));
+    return {{"order", g.order},
+            {"channels", g.channels},
+            {"fixed", g.fixed},
+            {"components", {{"rank", g.rank()}, {"bufferView", *glossy_rows_}}},
+            {"attributes", attributes},
+            {"scale", glossy_->form().scale},
+            {"offset", glossy_->form().offset},
+            {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *lobes_}}}};
   }
 
   json transfer_extension() const {
@@ -171,6 +208,7 @@ class Writer {
                 {"look", {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}}},
                 {"units", "W m^-2 sr^-1"}};
     if (components_) out["components"] = {{"rank", form.components.rank()}, {"bufferView", *components_}};
+    if (glossy_) out["glossy"] = glossy_extension();
     return out;
   }
 
@@ -230,7 +268,8 @@ class Writer {
   const BakedScene& baked_;
   const Encoding& encoding_;
   std::optional<StoredTransfer> transfer_;
-  std::optional<std::size_t> components_;  // buffer view
+  std::optional<StoredGlossy> glossy_;
+  std::optional<std::size_t> components_, glossy_rows_, lobes_;  // buffer views
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();
   json baked_primitives_ = json::array(), original_primitives_ = json::array();

@@ -1,6 +1,7 @@
 #include "core/bake/bake.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +13,7 @@
 #include "core/bake/certificate.h"
 #include "core/bake/checkpoint.h"
 #include "core/bake/compression.h"
+#include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_step.h"
 #include "core/bake/job_light.h"
 #include "core/bake/lightings.h"
@@ -61,10 +63,12 @@ std::string provenance(const BakeInput& input) {
 }
 
 /// The baked scene before it is written: transport, the job's light, and an exposure that suits both.
-BakedScene assemble(Scene scene, Transfer transfer, BakedLight light, std::string provenance_json) {
+BakedScene assemble(Scene scene, Transport transport, BakedLight light, std::string provenance_json) {
   BakedScene baked;
   baked.scene = std::move(scene);
-  baked.transfer = std::move(transfer);
+  baked.transfer = std::move(transport.transfer);
+  baked.glossy = std::move(transport.glossy.transfer);
+  if (baked.glossy) baked.lobes = make_lobe_table(baked.glossy.order);
   baked.light = std::move(light);
   baked.exposure = automatic_exposure(baked.scene.mesh, baked_colors(baked));
   baked.provenance = std::move(provenance_json);
@@ -114,6 +118,7 @@ struct Pass {
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
+  std::optional<GlossyReport> glossy;
 };
 
 /// The step `radiosity`, and where the plan has one the grid that looks at its surface.
@@ -147,9 +152,13 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
   }
   log.begin("write", 0.9);
-  BakedScene baked = assemble(std::move(scene), std::move(transport.transfer), std::move(own), provenance(input));
-  const Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
-  const StorageProbes storage = probe_storage(baked, encoding.transfer, transport.noise.vertices);
+  const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
+  const Probes noise = std::move(transport.noise);
+  BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
+  Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
+  if (baked.glossy)
+    encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
+  const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   scene = std::move(baked.scene);
@@ -162,8 +171,21 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     pass.certificate = certify(
         decoded, truth, light,
         {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
-    if (!plan.radiosity)
-      pass.sources = split_error(*pass.certificate, decoded, transport.noise, storage, plan.tail_left);
+    if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
+  }
+  if (decoded.glossy) {
+    pass.glossy = GlossyReport{.order = decoded.glossy.order,
+                               .channels = decoded.glossy.channels,
+                               .vertices = decoded.glossy.vertices.size(),
+                               .rank = decoded.glossy.rank(),
+                               .compression = left_out,
+                               .noise = glossy_noise,
+                               .certificate = {}};
+    if (input.recipe.certificate) {
+      const Tracer truth(scene, threads);
+      pass.glossy->certificate =
+          certify_glossy(decoded, truth, light, {.bake_rays = log.rays(), .seed = input.recipe.seed}, threads);
+    }
   }
   pass.rank = encoding.transfer.components.rank();
   pass.plan = std::move(plan);
@@ -239,6 +261,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   log.begin("plan", 0.06);
   const Plan plan = plan_of(scene, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
+  scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   if (!light && !plan.lamps) {
     scene.warnings.push_back(
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
@@ -267,6 +290,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .certificate = pass.certificate,
                                           .sources = pass.sources,
                                           .grid = pass.grid,
+                                          .glossy = pass.glossy,
                                           .passes = passes});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});
@@ -283,6 +307,7 @@ Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   KILN_TRY(light, job_light(input));
   const Plan plan = plan_of(scene, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
+  scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   return plan_report_json(plan, scene, input.recipe.promise);
 }
 

@@ -6,6 +6,7 @@
 #include "core/artifact/baked_geometry.h"
 #include "core/artifact/stored_transfer.h"
 #include "core/bake/lightings.h"
+#include "core/mesh/topology.h"
 
 namespace kiln {
 namespace {
@@ -24,6 +25,23 @@ double stored_bits(const BakedScene& baked, const TransferEncoding& encoding) {
   return sum;
 }
 
+/// Mean light of the lamps over the surface.
+double mean_lamp_light(const BakedScene& baked) {
+  const Transfer& t = baked.transfer;
+  double sum = 0, area = 0;
+  for (const Triangle& triangle : baked.scene.mesh.triangles) {
+    const double a = triangle_area(baked.scene.mesh, triangle);
+    area += a;
+    for (const std::uint32_t v : triangle) {
+      for (int c = 0; c < t.channels; ++c) sum += a * std::abs(t.at(v, c)[t.slots() - 1]) / (3 * t.channels);
+    }
+  }
+  return area > 0 ? sum / area : 0;
+}
+
+/// Rounding to steps of s adds s^2 / 12 to the squared error.
+double step_for(double error) { return error * std::sqrt(12.0); }
+
 Compression components(const BakedScene& baked, const Plan& plan) {
   const double share = plan.compression / std::sqrt(2.0);
   const ComponentAnalysis analysis =
@@ -36,7 +54,7 @@ Compression components(const BakedScene& baked, const Plan& plan) {
   out.encoding = {.bits = plan.encoding.bits.value_or(plan.raw_bits),
                   .components = analysis.first(rank),
                   .weights = analysis.weights(baked.transfer, rank)};
-  if (!plan.encoding.bits) out.encoding.weight_step = share * std::sqrt(12.0 / static_cast<double>(rank));
+  if (!plan.encoding.bits) out.encoding.weight_step = step_for(share / std::sqrt(static_cast<double>(rank)));
   return out;
 }
 
@@ -65,9 +83,13 @@ StorageProbes probe_storage(const BakedScene& baked, const TransferEncoding& enc
 
 Compression choose_encoding(const BakedScene& baked, const Plan& plan) {
   using Form = PrtStep::Encoding::Form;
-  Compression raw{{.bits = plan.encoding.bits.value_or(plan.raw_bits)}};
+  double lamp_step = 0;
+  if (baked.transfer.fixed && !plan.encoding.bits)
+    lamp_step = step_for(plan.compression / std::sqrt(2.0) * mean_lamp_light(baked));
+  Compression raw{{.bits = plan.encoding.bits.value_or(plan.raw_bits), .lamp_step = lamp_step}};
   if (plan.encoding.form == Form::raw || baked.transfer.order == 0) return raw;
   Compression fewer = components(baked, plan);
+  fewer.encoding.lamp_step = lamp_step;
   if (plan.encoding.form == Form::components || plan.encoding.rank) return fewer;
   return stored_bits(baked, fewer.encoding) < stored_bits(baked, raw.encoding) ? fewer : raw;
 }

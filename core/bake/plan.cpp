@@ -73,6 +73,23 @@ void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
              " % of error");
 }
 
+/// As many rays as a transfer vector may take, all of them: a sharp lobe averages few. Storage may add what it may add
+/// to the vectors, four times over: lobes blur the bands where most of it lies.
+void plan_matrices(Plan& plan, const Scene& scene, const PrtStep& step) {
+  GlossyDecision glossy = plan_glossy(scene, step.glossy, plan.order);
+  plan.glossy = std::move(glossy.plan);
+  plan.glossy.samples = std::clamp(plan.samples, 16, 4096);
+  plan.glossy.compression = 4 * plan.compression;
+  plan.warnings.insert(plan.warnings.end(), glossy.warnings.begin(), glossy.warnings.end());
+  if (plan.glossy && !scene.lights.empty()) {
+    plan.warnings.push_back({"glossy_punctual",
+                             "Highlights of punctual lights are not baked: specular parts show what such lights do to "
+                             "diffuse surfaces.",
+                             ""});
+  }
+  decide(plan, "glossy", glossy.value, glossy.reason);
+}
+
 void plan_lamps(Plan& plan, const Scene& scene) {
   plan.lamps = has_lamps(scene);
   decide(plan, "lamps", plan.lamps ? "baked" : "skipped",
@@ -136,7 +153,7 @@ Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Th
   plan_samples(plan, step, effort);
   plan_subdivision(plan, scene, step.subdivide, effort);
   plan_encoding(plan, step, effort);
-  decide(plan, "glossy", "skipped", "this engine models every surface as diffuse with its full reflectance");
+  plan_matrices(plan, scene, step);
   plan.costs = measure_costs(tracer, plan, threads);
   plan.prediction = predict(plan, scene);
   return plan;

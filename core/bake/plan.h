@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/bake/forecast.h"
+#include "core/bake/glossy_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
@@ -35,11 +36,13 @@ struct Plan {
   bool split = false;        // subdivide at all
   Subdivide subdivide;
   PrtStep::Encoding encoding;
-  int raw_bits = 12;                   // of coefficients, where the encoding leaves them open
-  double compression = 0.005;          // relRMSE that components may add
+  int raw_bits = 12;           // of coefficients, where the encoding leaves them open
+  double compression = 0.005;  // relRMSE that components may add
+  GlossyPlan glossy;
   std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
   std::vector<Decision> decisions;
+  std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;
   Prediction prediction;
 };

@@ -5,8 +5,10 @@
 #include <limits>
 
 #include "core/artifact/evaluate.h"
+#include "core/artifact/eye.h"
 #include "core/artifact/look.h"
 #include "core/artifact/png.h"
+#include "core/bake/eye_material.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -66,6 +68,7 @@ struct Painter {
   const BakedScene& baked;
   const Tracer& tracer;
   std::vector<Vec3f> value;
+  EyeLight light;
 
   Vec3f background(float height) const {
     const float t = std::clamp(height, 0.0F, 1.0F);
@@ -78,8 +81,21 @@ struct Painter {
     const Scene& scene = tracer.scene();
     const SurfacePoint place = surface_point(scene, hit.triangle, hit.u, hit.v);
     const Triangle& t = scene.mesh.triangles[hit.triangle];
-    const Vec3f light = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
-    return tone_map((light * albedo_at(scene, place) + emission_at(scene, place)) * baked.exposure);
+    if (baked.glossy && has_matrices(baked.glossy, t)) return shown(specular(hit, place, t, direction), place);
+    const Vec3f at = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
+    return shown(at * albedo_at(scene, place), place);
+  }
+
+  Vec3f shown(const Vec3f& reflected, const SurfacePoint& place) const {
+    return tone_map((reflected + emission_at(tracer.scene(), place)) * baked.exposure);
+  }
+
+  /// All that a part with matrices reflects to the camera.
+  Vec3f specular(const Hit& hit, const SurfacePoint& place, const Triangle& t, const Vec3f& direction) const {
+    const Vec3d normal = normalized(to_double(place.normal)), view = normalized(to_double(-direction));
+    const EyeMaterial material = eye_material(tracer.scene(), place);
+    const EyeRadiance seen = eye_radiance(baked, light, {{t, hit.u, hit.v}, normal, view, material});
+    return to_float(seen.diffuse + seen.specular);
   }
 };
 
@@ -93,7 +109,8 @@ std::uint8_t srgb_byte(float x) {
 Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview& preview,
                              Threads& threads) {
   const Camera camera = frame_camera(decoded.scene.mesh, preview);
-  const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients)};
+  const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients),
+                        eye_light(decoded, decoded.light.coefficients, true)};
   const auto width = static_cast<std::size_t>(preview.width), height = static_cast<std::size_t>(preview.height);
   Bytes pixels(width * height * 3);
   threads.for_blocks(height, 4, [&](std::size_t begin, std::size_t end) {

@@ -121,7 +121,8 @@ PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors)
   step.bounces = small("bounces", 0, 64);
   step.samples = small("samples", 1, 65536);
   fields.word("solver", {"vertices"});
-  fields.word("glossy", {"auto", "off"});
+  constexpr PrtStep::Glossy kGlossy[] = {PrtStep::Glossy::automatic, PrtStep::Glossy::on, PrtStep::Glossy::off};
+  if (const auto glossy = fields.word("glossy", {"auto", "on", "off"})) step.glossy = kGlossy[*glossy];
   if (const json* value = fields.find("subdivide"))
     step.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
   if (const json* value = fields.find("encoding")) step.encoding = read_encoding(*value, pointer + "/encoding", errors);
@@ -323,13 +324,17 @@ json encoding_json(const PrtStep::Encoding& e) {
   return {{"form", kForms[static_cast<int>(e.form)]}, {"rank", or_auto(e.rank)}, {"bits", or_auto(e.bits)}};
 }
 
+/// `glossy` is left out where it is auto, so that the hash of a recipe older than it, and with it the bytes of a scene
+/// without specular parts, are what they were.
 json step_json(const PrtStep& step) {
-  return {{"do", "prt"},
-          {"order", or_auto(step.order)},
-          {"bounces", or_auto(step.bounces)},
-          {"samples", or_auto(step.samples)},
-          {"subdivide", subdivision_json(step.subdivide)},
-          {"encoding", encoding_json(step.encoding)}};
+  json out = {{"do", "prt"},
+              {"order", or_auto(step.order)},
+              {"bounces", or_auto(step.bounces)},
+              {"samples", or_auto(step.samples)},
+              {"subdivide", subdivision_json(step.subdivide)},
+              {"encoding", encoding_json(step.encoding)}};
+  if (step.glossy != PrtStep::Glossy::automatic) out["glossy"] = step.glossy == PrtStep::Glossy::on ? "on" : "off";
+  return out;
 }
 
 json step_json(const RadiosityStep& step) {

@@ -49,6 +49,11 @@ struct PrtStep {
     std::optional<int> bits;                                                // of each stored number
   };
   Encoding encoding;
+  enum class Glossy {
+    automatic,
+    on,
+    off
+  } glossy = Glossy::automatic;  // matrices: where they show, everywhere, nowhere
 };
 
 /// Light of one job at the vertices: no order, nothing to turn (core/meshless/radiosity.h).
@@ -104,7 +109,7 @@ struct Recipe {
 /// Parses and checks a recipe. All mistakes at once.
 tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view json);
 
-/// The recipe as canonical JSON (every field, sorted keys): equal recipes give equal text.
+/// The recipe as canonical JSON (every field but glossy: auto, sorted keys): equal recipes give equal text.
 std::string recipe_json(const Recipe&);
 
 /// The part of recipe_json that decides the artefacts' bytes (no label, no limits, no scene): a key for result caches.

@@ -131,6 +131,25 @@ ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
   return out;
 }
 
+ordered_json glossy_object(const GlossyReport& g) {
+  ordered_json out = {{"order", g.order}, {"channels", g.channels},       {"vertices", g.vertices},
+                      {"rank", g.rank},   {"compression", g.compression}, {"noise", g.noise}};
+  if (!g.certificate) return out;
+  const GlossyCertificate& c = *g.certificate;
+  out["radiance"] = error_object(c.radiance);
+  for (std::size_t i = 0; i < c.lightings.size() && i < c.radiance.by_lighting.size(); ++i)
+    out["radiance"]["lightings"].push_back({{"name", c.lightings[i]}, {"relrmse", c.radiance.by_lighting[i]}});
+  out["specular"] = error_object(c.specular);
+  out["transport"] = error_object(c.transport);
+  out["truncation"] = error_object(c.truncation);
+  if (c.job_light) out["job_light"] = error_object(*c.job_light);
+  out["dark"] = c.dark;
+  out["points"] = c.points;
+  out["samples"] = c.samples;
+  out["seconds"] = c.seconds;
+  return out;
+}
+
 ordered_json radiosity_parameters(const Plan& plan) {
   const Radiosity& r = *plan.radiosity;
   return {{"scheme", "rows"},
@@ -162,7 +181,10 @@ ordered_json parameters_object(const Plan& plan) {
           {"measure", kMeasures[static_cast<int>(plan.subdivide.measure)]},
           {"threshold", plan.subdivide.threshold},
           {"max_depth", plan.subdivide.max_depth},
-          {"compression", plan.compression}};
+          {"compression", plan.compression},
+          {"glossy_order", plan.glossy.order},
+          {"glossy_samples", plan.glossy ? plan.glossy.samples : 0},
+          {"glossy_compression", plan.glossy ? plan.glossy.compression : 0}};
 }
 
 ordered_json prediction_object(const Prediction& p) {
@@ -233,6 +255,8 @@ std::string report_json(const ReportInput& in) {
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.recipe.promise)
     out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
+  if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
+  if (in.recipe.promise) out["promise"] = promise_object(in.recipe.promise, in.passes);
   return text_of(out);
 }
 

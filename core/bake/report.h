@@ -7,11 +7,20 @@
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/certificate.h"
+#include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_outcome.h"
 #include "core/bake/plan.h"
 #include "core/bake/progressive.h"
 
 namespace kiln {
+
+/// What is known of the matrices, where there are any.
+struct GlossyReport {
+  int order = 0, channels = 1;
+  std::size_t vertices = 0, rank = 0;
+  double compression = 0, noise = 0;  // as GlossyBaked
+  std::optional<GlossyCertificate> certificate;
+};
 
 /// Everything a report is made from.
 struct ReportInput {
@@ -27,6 +36,7 @@ struct ReportInput {
   const std::optional<Certificate>& certificate;
   const std::optional<ErrorSources>& sources;
   const std::optional<GridOutcome>& grid;
+  const std::optional<GlossyReport>& glossy;
   const Passes& passes;  // none where a quality was asked for
 };
 

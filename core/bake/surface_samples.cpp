@@ -1,8 +1,9 @@
 #include "core/bake/surface_samples.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
-#include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/sphere/sampling.h"
 
@@ -27,6 +28,12 @@ std::vector<SurfaceSample> sample_surface(const Mesh& mesh, std::size_t count, s
     samples.push_back({static_cast<std::uint32_t>(triangle), static_cast<float>(uv.x), static_cast<float>(uv.y)});
   }
   return samples;
+}
+
+Vec3d random_view(const Vec3d& n, Random& random) {
+  const double z = 1 - random.uniform_double(), phi = 2 * std::numbers::pi * random.uniform_double();
+  const double r = std::sqrt(1 - z * z);
+  return normalized(basis_around(n).to_world({r * std::cos(phi), r * std::sin(phi), z}));
 }
 
 }  // namespace kiln

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/base/random.h"
+#include "core/base/vec.h"
 #include "core/mesh/mesh.h"
 
 namespace kiln {
@@ -19,5 +21,8 @@ struct SurfaceSample {
 /// Empty when the mesh has no area.   Repeat  a function of mesh, count, seed and density.
 std::vector<SurfaceSample> sample_surface(const Mesh&, std::size_t count, std::uint64_t seed,
                                           std::span<const double> density = {});
+
+/// The direction of an eye, even over the half space of n. Takes two numbers.
+Vec3d random_view(const Vec3d& n, Random&);
 
 }  // namespace kiln

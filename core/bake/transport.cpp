@@ -166,6 +166,29 @@ std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPo
   return out;
 }
 
+bool emission_has_hue(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& m) {
+    return m.emission != Vec3f{} &&
+           (m.emission.x != m.emission.y || m.emission.y != m.emission.z || m.emission_texture.texture >= 0);
+  });
+}
+
+/// Matrices of the parts that are to have them, from the finished transfer vectors.
+GlossyBaked bake_matrices(const Tracer& tracer, const Transfer& transfer, const Plan& plan,
+                          const std::vector<double>& band_power, GlossyBake bake, Threads& threads) {
+  const std::vector<std::uint32_t> vertices = vertices_of_parts(tracer.scene().mesh, plan.glossy.parts);
+  if (!plan.glossy || vertices.empty()) return {};
+  bake.matrix = {.order = plan.glossy.order,
+                 .channels = transfer.channels == 3 || (plan.lamps && emission_has_hue(tracer.scene())) ? 3 : 1,
+                 .fixed = transfer.fixed,
+                 .reflected = plan.bounces > 0,
+                 .samples = plan.glossy.samples,
+                 .seed = bake.matrix.seed};
+  bake.band_power.assign(band_power.begin(), band_power.begin() + plan.glossy.order);
+  bake.left_out = plan.glossy.compression / std::sqrt(2.0);  // the other half of the square is for rounding
+  return bake_glossy(tracer, transfer, vertices, bake, threads);
+}
+
 void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
   if (plan.bounces == 0 || source.stats.open_points < source.points) return;
   plan.bounces = 0;
@@ -247,11 +270,19 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
                             .bounces = plan.bounces,
                             .samples = plan.bounce_samples,
                             .seed = seed,
-                            .stand_ins = std::move(stand_ins),
+                            .stand_ins = stand_ins,
                             .probes = out.noise.vertices,
                             .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
                            threads, &stats, &reflected);
   log.count_rays(stats.rays);
+  if (plan.glossy) {
+    log.begin("glossy", 0.88);
+    GlossyBake bake{.stand_ins = std::move(stand_ins),
+                    .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }};
+    bake.matrix.seed = seed;
+    out.glossy = bake_matrices(tracer, out.transfer, plan, band_power, std::move(bake), threads);
+    log.count_rays(out.glossy.rays);
+  }
   out.noise.difference = std::move(direct_noise);
   for (std::size_t i = 0; i < reflected.difference.size(); ++i) out.noise.difference[i] += reflected.difference[i];
   return out;

@@ -8,6 +8,7 @@
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
 #include "core/prt/direct_transfer.h"
+#include "core/prt/glossy_bake.h"
 #include "core/prt/transfer.h"
 #include "core/scene/scene.h"
 #include "core/trace/tracer.h"
@@ -21,8 +22,9 @@ struct Probes {
 };
 
 struct Transport {
-  Transfer transfer;  // of scene.mesh's vertices
-  Probes noise;       // a second, independent draw of the same samples minus the first
+  Transfer transfer;   // of scene.mesh's vertices
+  Probes noise;        // a second, independent draw of the same samples minus the first
+  GlossyBaked glossy;  // as planned
 };
 
 inline constexpr int kRoughRays = 4;  // so many times fewer for points that only tell where to split

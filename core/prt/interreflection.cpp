@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 
 #include "core/base/expects.h"
+#include "core/mesh/topology.h"
 #include "core/prt/gather.h"
 #include "core/prt/morton.h"
 #include "core/prt/support_tree.h"
@@ -21,6 +23,29 @@ constexpr std::size_t kBlock = 64;  // vertices of a unit of work
 constexpr int kLatePasses = 2, kEarlyShare = 4;
 
 int early_samples(const Interreflection& params) { return std::max(1, params.samples / kEarlyShare); }
+
+// The error is a mean over the surface, so that noise at a vertex of little surface hardly counts: rays in proportion
+// to the root of the area around it leave the least for their number (Lagrange). No vertex takes more than `samples`,
+// and none fewer than a sixteenth, so that whoever looks closely sees no speckles.
+constexpr std::array<int, 3> kShares = {1, 4, 16};
+
+/// Index into kShares of each vertex: the share nearest to the root of its area over the mean.
+std::vector<std::uint8_t> shares_of(const Mesh& mesh) {
+  std::vector<double> area(mesh.position.size());
+  double all = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const double third = triangle_area(mesh, t) / 3;
+    for (const std::uint32_t v : t) area[v] += third;
+    all += 3 * third;
+  }
+  const double mean = all / static_cast<double>(std::max<std::size_t>(area.size(), 1));
+  std::vector<std::uint8_t> out;
+  for (const double a : area) {
+    const double root = std::sqrt(a / mean);
+    out.push_back(root > 0.5 ? 0 : root > 0.125 ? 1 : 2);
+  }
+  return out;
+}
 
 bool is_grey(const std::vector<Vec3f>& light) {
   return std::all_of(light.begin(), light.end(), [](const Vec3f& x) { return x.x == x.y && x.y == x.z; });
@@ -104,6 +129,7 @@ class Solver {
   // The order of work, and who needs any: before the rows are there, since both take memory for a while.
   void plan_work() {
     order_ = morton_order(mesh_.position);
+    share_ = shares_of(mesh_);
     const SupportTree support(mesh_.position);
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
       const Vec3f& n = mesh_.normal[v];
@@ -113,37 +139,45 @@ class Solver {
 
   // T_{k+1} = D + K T_k, `bounces` times.
   void iterate(Layer& light, Threads& threads, TransferStats* stats, ProbeNoise* noise) {
-    const DirectionSets many(0, params_.samples, kSets, mix64(params_.seed));
-    const DirectionSets few(0, early_samples(params_), kSets, mix64(params_.seed));
+    const std::vector<DirectionSets> many = shared_sets(params_.samples), few = shared_sets(early_samples(params_));
     Layer next = layer(1);
     std::uint64_t sent = 0;
     for (int pass = 0; pass < params_.bounces; ++pass) {
-      const DirectionSets& sets = pass + kLatePasses < params_.bounces ? few : many;
-      const GatherSource source{tracer_,     lamps_,        faces_,        albedo_, sets,        light.rows,
-                                light.fixed, params_.order, out_.channels, pass,    params_.seed};
+      const std::vector<DirectionSets>& sets = pass + kLatePasses < params_.bounces ? few : many;
+      std::vector<GatherSource> sources;
+      for (const DirectionSets& s : sets)
+        sources.push_back({tracer_, lamps_, faces_, albedo_, s, light.rows, light.fixed, params_.order, out_.channels,
+                           pass, params_.seed});
       std::atomic<std::uint64_t> rays = 0;
       threads.for_blocks(order_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-        Gatherer gatherer(source);
-        for (std::size_t i = begin; i < end; ++i) update(order_[i], gatherer, pass, next);
-        rays += gatherer.rays();
+        std::vector<Gatherer> gatherers(sources.begin(), sources.end());
+        for (std::size_t i = begin; i < end; ++i) update(order_[i], gatherers[share_[order_[i]]], pass, next);
+        for (const Gatherer& g : gatherers) rays += g.rays();
       });
       if (stats != nullptr) stats->rays += rays;
-      if (noise != nullptr && pass + 1 == params_.bounces) noise->difference = draw_probes_twice(source);
+      if (noise != nullptr && pass + 1 == params_.bounces) noise->difference = draw_probes_twice(sources);
       std::swap(light, next);
-      sent += static_cast<std::uint64_t>(sets.samples());
+      sent += static_cast<std::uint64_t>(sets.front().samples());
       if (params_.progress) params_.progress(sent, rays_per_vertex(params_));
     }
   }
 
-  std::vector<float> draw_probes_twice(const GatherSource& first) const {
-    GatherSource second = first;
-    second.seed = mix64(first.seed ^ 0x6e6f697365ULL);
-    Gatherer a(first), b(second);
+  std::vector<DirectionSets> shared_sets(int samples) const {
+    std::vector<DirectionSets> out;
+    for (const int share : kShares) out.emplace_back(0, std::max(1, samples / share), kSets, mix64(params_.seed));
+    return out;
+  }
+
+  std::vector<float> draw_probes_twice(const std::vector<GatherSource>& first) const {
+    std::vector<GatherSource> second = first;
+    for (GatherSource& s : second) s.seed = mix64(s.seed ^ 0x6e6f697365ULL);
+    std::vector<Gatherer> once(first.begin(), first.end()), again(second.begin(), second.end());
     const std::size_t slots = count() + (out_.fixed ? 1 : 0);
     std::vector<float> difference(params_.probes.size() * 3 * slots, 0.0F);
     float* to = difference.data();
     for (const std::uint32_t v : params_.probes) {
       if (sees_surfaces_[v]) {
+        Gatherer &a = once[share_[v]], &b = again[share_[v]];
         a.gather(point_of(v));
         b.gather(point_of(v));
         for (std::size_t c = 0; c < 3; ++c) {
@@ -214,6 +248,7 @@ class Solver {
   std::vector<Vec3f> fixed_direct_;
   std::vector<std::uint32_t> order_;
   std::vector<bool> sees_surfaces_;
+  std::vector<std::uint8_t> share_;
   Transfer out_;
   std::size_t pitch_ = 0;
 };

@@ -22,7 +22,8 @@ namespace kiln {
 struct Interreflection {
   int order = 6;
   int bounces = 1;    // passes, >= 0
-  int samples = 256;  // closest-hit rays per vertex in each of the last two passes; a quarter of them before
+  int samples = 256;  // most closest-hit rays per vertex in each of the last two passes; a quarter of them before.
+                      // Vertices of little surface take as few as a sixteenth
   std::uint64_t seed = 0;
   std::vector<StandIn> stand_ins = {};     // where hidden vertices gather instead; ascending
   std::vector<std::uint32_t> probes = {};  // vertices whose last pass is done twice, to see its noise
@@ -35,7 +36,7 @@ struct ProbeNoise {
   std::vector<float> difference;
 };
 
-/// Rays that all passes send from one vertex.
+/// Rays that all passes send from a vertex of much surface.
 std::uint64_t rays_per_vertex(const Interreflection&);
 
 /// `direct` has sh_count(order) values per vertex; `fixed_direct` is empty or one RGB per vertex (direct light of the

@@ -12,6 +12,7 @@
 #include "core/sphere/sampling.h"
 #include "core/sphere/sh.h"
 #include "core/trace/environment_sampler.h"
+#include "core/trace/ggx.h"
 #include "core/trace/lights.h"
 #include "core/trace/surface.h"
 
@@ -69,6 +70,11 @@ class Estimator {
   /// Adds one path from `start` to sum[lighting]. Returns its vertices.
   int add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
+  /// The same, weighed by a lobe at `point` first. A lobe draws directions in the frame of the normal, tells their
+  /// density, and what light from one of them counts, cosine and all.
+  template <class Lobe>
+  int add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+
   std::uint64_t rays_per_vertex() const {
     std::uint64_t rays = 1;
     for (const EnvironmentSampler& sampler : samplers_) rays += sampler.useful() ? 1 : 0;
@@ -77,6 +83,8 @@ class Estimator {
   }
 
  private:
+  template <class Lobe>
+  void add_lobe_sky(const Vertex&, const Lobe&, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   void add_lamps(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
   Vec3d emitter_light(const Vertex&, double pick, const Vec2<double>& u) const;
@@ -203,10 +211,130 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
   return depth + 1;
 }
 
+/// The GGX lobe of a surface towards an eye.
+class GgxLobe {
+ public:
+  explicit GgxLobe(const EyedPoint& point)
+      : alpha_(point.alpha),
+        f0_(point.f0),
+        view_(basis_around(normalized(to_double(point.at.normal))).to_local(normalized(to_double(point.view)))) {}
+
+  bool seen() const { return view_.z > 0; }
+  /// May lie below the surface, where the density is 0.
+  Vec3d draw(const Vec2<double>& u) const { return sample_ggx(alpha_, view_, u).l; }
+  double density(const Vec3d& l) const { return ggx_density(alpha_, view_, l); }
+  Vec3d value(const Vec3d& l) const {
+    return (f0_ + (Vec3d{1, 1, 1} - f0_) * schlick_weight(view_, l)) * ggx_cosine(alpha_, view_, l);
+  }
+
+ private:
+  double alpha_;
+  Vec3d f0_, view_;
+};
+
+/// A kernel of few bands: half of its directions are those of a GGX lobe, half even over the half space.
+class KernelLobe {
+ public:
+  KernelLobe(const EyedPoint& point, const std::vector<double>& kernel)
+      : like_(point), basis_(basis_around(normalized(to_double(point.at.normal)))), kernel_(kernel) {
+    while (sh_count(order_) < static_cast<int>(kernel.size())) ++order_;
+  }
+
+  bool seen() const { return like_.seen(); }
+  Vec3d draw(const Vec2<double>& u) const {
+    if (u.x < 0.5) return like_.draw({2 * u.x, u.y});
+    const double z = 2 * u.x - 1, r = std::sqrt(std::max(0.0, 1 - z * z)), phi = 2 * std::numbers::pi * u.y;
+    return {r * std::cos(phi), r * std::sin(phi), z};
+  }
+  double density(const Vec3d& l) const { return l.z > 0 ? 0.5 * like_.density(l) + 0.25 / std::numbers::pi : 0; }
+  Vec3d value(const Vec3d& l) const {
+    if (!(l.z > 0)) return {};
+    std::array<double, sh_count(kMaxShOrder)> y;
+    evaluate_sh(order_, normalized(basis_.to_world(l)), y.data());
+    double sum = 0;
+    for (std::size_t i = 0; i < kernel_.size(); ++i) sum += kernel_[i] * y[i];
+    return {sum, sum, sum};
+  }
+
+ private:
+  GgxLobe like_;
+  Basis<double> basis_;
+  const std::vector<double>& kernel_;
+  int order_ = 1;
+};
+
+template <class Lobe>
+void Estimator::add_lobe_sky(const Vertex& v, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+  const Basis<double> basis = basis_around(v.normal);
+  for (std::size_t k = 0; k < samplers_.size(); ++k) {
+    if (!samplers_[k].useful()) continue;
+    const Vec3d w = samplers_[k].sample(numbers.pair(0)), l = basis.to_local(w), value = lobe.value(l);
+    if (value == Vec3d{} || tracer_.occluded(lifted(v), to_float(w), kFar)) continue;
+    const double density = samplers_[k].density(w) + lobe.density(l);
+    sum[k] += times(value / density, environment_radiance(light_.environments[k], to_float(w)));
+  }
+}
+
+template <class Lobe>
+int Estimator::add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers,
+                             std::vector<Vec3d>& sum) const {
+  const Vertex v{to_double(point.position), normalized(to_double(point.normal)), to_double(point.face_normal)};
+  if (!lobe.seen()) return 1;
+  const Vec3d l = lobe.draw(numbers.pair(0));
+  add_lobe_sky(v, lobe, numbers, sum);
+  const double density = lobe.density(l);
+  if (!(density > 0)) return 1;
+  const Vec3d weight = lobe.value(l) / density, w = normalized(basis_around(v.normal).to_world(l));
+  const Hit hit = tracer_.closest(lifted(v), to_float(w), kFar);
+  if (!hit) {
+    add_sky(w, density, weight, sum);
+    return 1;
+  }
+  const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
+  const Part& part = scene_.parts[scene_.mesh.part[hit.triangle]];
+  if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) return 1;
+  if (light_.scene_lights) sum.back() += times(weight, emission_at(scene_, p));
+  const double side = hit.back ? -1 : 1;
+  std::vector<Vec3d> there(sum.size());
+  const int visited = add_path(
+      {to_double(p.position), to_double(p.normal) * side, to_double(p.geometric_normal) * side}, numbers, there);
+  for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += times(weight, albedo_at(scene_, p)) * there[k];
+  return 1 + visited;
+}
+
 void check_light(const ReferenceLight& light) {
   EXPECTS(light.sh.empty() || (light.sh_order >= 1 && light.sh_order <= kMaxShOrder));
   for (const auto& coefficients : light.sh)
     EXPECTS(coefficients.size() == static_cast<std::size_t>(sh_count(light.sh_order)));
+}
+
+/// add(point, numbers, sum) for each sample of each point; it returns the vertices it visited.
+template <class Add>
+ReferenceResult estimate(const Estimator& estimator, std::size_t points, const ReferenceOptions& options,
+                         Threads& threads, const Add& add) {
+  const std::size_t lightings = estimator.lightings();
+  const int half = (options.samples + 1) / 2;
+  const std::vector<Vec3d> zero(lightings * points);
+  ReferenceResult result{zero, zero, zero};
+  std::atomic<std::uint64_t> vertices = 0;
+
+  threads.for_blocks(points, 1, [&](std::size_t point, std::size_t) {
+    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
+    std::uint64_t visited = 0;
+    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
+      PathNumbers numbers(options.seed, point, sample);
+      visited += static_cast<std::uint64_t>(add(point, numbers, sums[sample % 2]));
+    }
+    vertices += visited;
+    for (std::size_t k = 0; k < lightings; ++k) {
+      const std::size_t i = k * points + point;
+      result.half_a[i] = sums[0][k] / half;
+      result.half_b[i] = sums[1][k] / half;
+      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
+    }
+  });
+  result.rays = vertices * estimator.rays_per_vertex();
+  return result;
 }
 
 }  // namespace
@@ -216,31 +344,36 @@ ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferenceP
   EXPECTS(options.samples >= 1);
   check_light(light);
   const Estimator estimator(tracer, light, options);
-  const std::size_t lightings = estimator.lightings();
-  const int half = (options.samples + 1) / 2;
-  const std::vector<Vec3d> zero(lightings * points.size());
-  ReferenceResult result{zero, zero, zero};
-  std::atomic<std::uint64_t> vertices = 0;
+  return estimate(
+      estimator, points.size(), options, threads,
+      [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+        const ReferencePoint& p = points[point];
+        const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
+        return estimator.add_path(start, numbers, sum);
+      });
+}
 
-  threads.for_blocks(points.size(), 1, [&](std::size_t point, std::size_t) {
-    const ReferencePoint& p = points[point];
-    const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
-    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
-    std::uint64_t visited = 0;
-    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
-      PathNumbers numbers(options.seed, point, sample);
-      visited += static_cast<std::uint64_t>(estimator.add_path(start, numbers, sums[sample % 2]));
-    }
-    vertices += visited;
-    for (std::size_t k = 0; k < lightings; ++k) {
-      const std::size_t i = k * points.size() + point;
-      result.half_a[i] = sums[0][k] / half;
-      result.half_b[i] = sums[1][k] / half;
-      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
-    }
-  });
-  result.rays = vertices * estimator.rays_per_vertex();
-  return result;
+ReferenceResult trace_specular(const Tracer& tracer, std::span<const EyedPoint> points, const ReferenceLight& light,
+                               const ReferenceOptions& options, Threads& threads) {
+  EXPECTS(options.samples >= 1);
+  check_light(light);
+  const Estimator estimator(tracer, light, options);
+  return estimate(estimator, points.size(), options, threads,
+                  [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+                    return estimator.add_lobe_path(points[point].at, GgxLobe(points[point]), numbers, sum);
+                  });
+}
+
+ReferenceResult trace_kernels(const Tracer& tracer, const KernelPoints& points, const ReferenceLight& light,
+                              const ReferenceOptions& options, Threads& threads) {
+  EXPECTS(options.samples >= 1 && points.kernel.size() == points.eyed.size());
+  check_light(light);
+  const Estimator estimator(tracer, light, options);
+  return estimate(estimator, points.eyed.size(), options, threads,
+                  [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
+                    const EyedPoint& eyed = points.eyed[point];
+                    return estimator.add_lobe_path(eyed.at, KernelLobe(eyed, points.kernel[point]), numbers, sum);
+                  });
 }
 
 }  // namespace kiln

@@ -55,4 +55,33 @@ struct ReferenceResult {
 ReferenceResult trace_reference(const Tracer&, std::span<const ReferencePoint>, const ReferenceLight&,
                                 const ReferenceOptions&, Threads&);
 
+/// A point seen by an eye, and what it is made of (core/trace/ggx.h).
+struct EyedPoint {
+  ReferencePoint at;
+  Vec3f view;  // unit, towards the eye
+  double alpha = 1;
+  Vec3d f0;
+};
+
+/// Radiance that the GGX lobe of each point sends to its eye: as above, but the first reflection is specular and the
+/// value is
+///   integral over the hemisphere of n of L(x, w) f(view, w) (n.w) dw,  f of ggx.h
+/// All later reflections are diffuse. The last lighting is what the lobe shows of emitters and of surfaces that lamps
+/// light; the highlights of punctual lights themselves are left out.
+/// Method  visible normals drawn, and one ray to each environment map, joined by the balance heuristic; emitters are
+///         found by the path alone.
+ReferenceResult trace_specular(const Tracer&, std::span<const EyedPoint>, const ReferenceLight&,
+                               const ReferenceOptions&, Threads&);
+
+/// The same, but with a kernel of few bands in place of the lobe:
+///   integral over the hemisphere of n of L(x, w) K(w) dw,   K(w) = sum_i kernel_i Y_i(w)
+/// kernel[point] has order^2 numbers in world axes, 1 <= order <= kMaxShOrder; the points' lobes only say where most
+/// directions are drawn. What is seen past the view's horizon is 0, as above.
+struct KernelPoints {
+  std::span<const EyedPoint> eyed;
+  std::span<const std::vector<double>> kernel;  // same size
+};
+ReferenceResult trace_kernels(const Tracer&, const KernelPoints&, const ReferenceLight&, const ReferenceOptions&,
+                              Threads&);
+
 }  // namespace kiln

@@ -39,8 +39,8 @@ Vec4f vertex_color_at(const Scene& scene, const SurfacePoint& p) {
           a.w * w + b.w * p.u + c.w * p.v};
 }
 
-Vec4f texture_at(const Scene& scene, const SurfacePoint& p, const TextureRef& ref) {
-  return sample_texture(scene, ref, uv_at(scene, p, ref.uv_set), true);
+Vec4f texture_at(const Scene& scene, const SurfacePoint& p, const TextureRef& ref, bool srgb = true) {
+  return sample_texture(scene, ref, uv_at(scene, p, ref.uv_set), srgb);
 }
 
 }  // namespace
@@ -68,6 +68,12 @@ Vec3f albedo_at(const Scene& scene, const SurfacePoint& p) {
   const auto limited = [](float x) { return std::clamp(x, 0.0F, kMaxAlbedo); };
   return {limited(material.base_color.x * texel.x * tint.x), limited(material.base_color.y * texel.y * tint.y),
           limited(material.base_color.z * texel.z * tint.z)};
+}
+
+SurfaceFinish finish_at(const Scene& scene, const SurfacePoint& p) {
+  const Material& material = material_of(scene, p.triangle);
+  const Vec4f texel = texture_at(scene, p, material.metallic_roughness_texture, false);
+  return {std::clamp(material.metallic * texel.z, 0.0F, 1.0F), std::clamp(material.roughness * texel.y, 0.0F, 1.0F)};
 }
 
 Vec3f emission_at(const Scene& scene, const SurfacePoint& p) {

@@ -18,9 +18,14 @@ struct SurfacePoint {
 SurfacePoint surface_point(const Scene&, std::uint32_t triangle, float u, float v);
 
 /// Linear reflectance at a point: base colour factor x texture x vertex colour, clamped to [0, 0.999].
-/// Kiln models every surface as Lambertian with this albedo (metals too: their reflectance is kept, its direction is
-/// not).
+/// Light on its way between surfaces finds each of them Lambertian with this albedo (metals too: their reflectance is
+/// kept, its direction is not).
 Vec3f albedo_at(const Scene&, const SurfacePoint&);
+/// Metallic and roughness factor x texture (blue and green, linear), each limited to [0, 1].
+struct SurfaceFinish {
+  float metallic = 0, roughness = 1;
+};
+SurfaceFinish finish_at(const Scene&, const SurfacePoint&);
 /// Emitted radiance of the front face. The back of a double-sided material emits the same, that of others nothing:
 /// the caller knows from which side it looks.
 Vec3f emission_at(const Scene&, const SurfacePoint&);

@@ -57,5 +57,5 @@ async function check(name) {
   }
 }
 
-for (const name of ['scene.glb', 'components.glb'])
+for (const name of ['scene.glb', 'components.glb', 'glossy.glb'])
   test(`${name}: a stock GLTFLoader reads both scenes, and our reader gives the light that the file defines`, () => check(name));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <tuple>
 
 #include "client_cli/csv.h"
 #include "client_cli/values.h"
@@ -53,6 +54,18 @@ TEST_F(Light, PointsLieOnTheSurfaceEvenlyAndRepeat) {
   EXPECT_EQ(folder.read("p.csv"), first);
 }
 
+TEST_F(Light, AViewDirectionMustBeADirection) {
+  const std::string bad = folder.write("bad.csv", "0,0,0,0,1,0,0,0,0\n");
+  const auto points = read_points(bad);
+  ASSERT_FALSE(points);
+  const auto good = read_points(folder.write("good.csv", "0,0,0,0,1,0,1,2,0\n"));
+  ASSERT_TRUE(good && (*good)[0].view);
+  EXPECT_EQ((*good)[0].view->y, 2);
+  const auto none = read_points(folder.write("none.csv", "0,0,0,0,1,0\n"));
+  ASSERT_TRUE(none);
+  EXPECT_FALSE((*none)[0].view);
+}
+
 TEST_F(Light, APlaneUnderAConstantSkyOfOneReceivesPi) {
   const ValueTable truth =
       values({"reference", scene, "--points", draw(scene, 50), "--env", "1,1,1", "--samples", "64"});
@@ -63,6 +76,59 @@ TEST_F(Light, APlaneUnderAConstantSkyOfOneReceivesPi) {
     EXPECT_NEAR(value.radiance.z, 1, 1e-5);
     EXPECT_NEAR(value.irradiance_error.y, 0, 1e-5);
   }
+}
+
+/// The plane in another finish.
+std::string finished(const std::string& metallic, const std::string& roughness) {
+  std::string text = plane_gltf(1, 8);
+  const std::string key = R"("indices":2})", first = "{";
+  text.replace(text.find(key), key.size(), R"("indices":2,"material":0})");
+  return text.replace(0, 1,
+                      R"({"materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":)" +
+                          metallic + R"(,"roughnessFactor":)" + roughness + "}}],");
+}
+
+TEST_F(Light, TowardsAnEyeTheReferenceShowsTheFresnelReflectionOfASmoothSurface) {
+  // Under a constant sky of 1 a mirror of F0 shows F = F0 + (1 - F0) (1 - n.v)^5; what a dielectric transmits its
+  // colour.
+  const auto points = folder.write("p.csv", "x,y,z,nx,ny,nz,vx,vy,vz\n0.1,0,0.2,0,1,0,0,2,0\n0.1,0,0.2,0,1,0,4,3,0\n");
+  const double slant = std::pow(0.4, 5);
+  for (const auto& [metallic, f0, below] : {std::tuple{"1", 0.5, 0.0}, std::tuple{"0", 0.04, 0.5}}) {
+    const ValueTable truth = values({"reference", folder.write("finished.gltf", finished(metallic, "0")), "--points",
+                                     points, "--env", "1,1,1", "--samples", "256", "--albedo", "scene"});
+    ASSERT_EQ(truth.values.size(), 2U);
+    ASSERT_TRUE(truth.points[1].view);
+    for (const std::size_t i : {0U, 1U}) {
+      const double f = f0 + (1 - f0) * (i == 1 ? slant : 0);
+      EXPECT_NEAR(truth.values[i].radiance.x, f + (1 - f) * below, 2e-3);  // roughness .03, and the table of lobes
+      EXPECT_NEAR(truth.values[i].irradiance.x, kPi, 1e-5);
+    }
+  }
+  const ValueTable white = values({"reference", folder.path("finished.gltf"), "--points", points, "--env", "1,1,1"});
+  EXPECT_NEAR(white.values[1].radiance.x, 1, 1e-5) << "albedo one knows no eye";
+}
+
+TEST_F(Light, ABakedMetalShowsEyesWhatTheReferenceSays) {
+  const std::string metal = folder.write("metal.gltf", finished("1", "0.6"));
+  const std::string artefact = folder.path("out/scene.glb"), points = folder.path("p.csv");
+  ASSERT_EQ(run_kiln({"bake", metal, "--env", "1,1,1", "--quality", "draft", "-o", folder.path("out")}).exit, 0);
+  ASSERT_EQ(run_kiln({"points", artefact, "--count", "100", "--views", "--specular", "-o", points}).exit, 0);
+  const auto drawn = read_points(points);
+  ASSERT_TRUE(drawn && drawn->size() == 100U);
+  for (const QueryPoint& p : *drawn) EXPECT_GE(dot(*p.view, p.normal), 0);
+  const std::string a = folder.path("a.csv"), b = folder.path("b.csv");
+  ASSERT_EQ(run_kiln({"eval", artefact, "--points", points, "--albedo", "scene", "-o", a}).exit, 0);
+  ASSERT_EQ(run_kiln({"reference", metal, "--points", points, "--env", "1,1,1", "--samples", "512", "--albedo", "scene",
+                      "-o", b})
+                .exit,
+            0);
+  // Open to a constant sky: what is left is the table of lobes, .01 between its entries and .03 near grazing.
+  EXPECT_EQ(run_kiln({"compare", a, b, "--column", "radiance", "--max-error", "0.02"}).exit, 0);
+  EXPECT_EQ(run_kiln({"compare", artefact, b, "--column", "radiance", "--albedo", "scene", "--max-error", "0.02"}).exit,
+            0);
+  EXPECT_EQ(run_kiln({"compare", artefact, b, "--column", "radiance", "--max-error", "0.3"}).exit, 8)
+      << "white is not the metal";
+  EXPECT_EQ(run_kiln({"points", metal, "--specular"}).exit, 2) << "a scene has no matrices";
 }
 
 TEST_F(Light, TheReferenceIsLinearInItsLight) {

@@ -99,6 +99,23 @@ TEST(ComponentsGlb, CoarserStepsNeedFewerBits) {
   EXPECT_LE(bits.front(), 20);
 }
 
+// A vertex beside a lamp has thousands of times the mean: its range must not cost the others their digits.
+TEST(ComponentsGlb, OneVertexBesideALampLeavesTheOthersTheirDigits) {
+  for (const bool raw : {false, true}) {
+    BakedScene baked = random_baked({.order = 2, .channels = 1, .fixed = true});
+    float& brightest = baked.transfer.coefficients[static_cast<std::size_t>(baked.transfer.slots()) - 1];
+    brightest = 5000;
+    TransferEncoding encoding = raw ? TransferEncoding{.bits = 10} : as_components(baked, 4);
+    encoding.lamp_step = 0.01;
+    const StoredTransfer stored(baked.transfer, encoding, used_vertices(baked.scene.mesh));
+    for (std::size_t v = 0; v < baked.transfer.vertices(); ++v) {
+      const auto lamp = static_cast<std::size_t>(baked.transfer.slots()) - 1;
+      const float exact = baked.transfer.at(v, 0)[lamp], rounded = stored.read_back(v, true)[lamp];
+      EXPECT_NEAR(exact, rounded, 0.005 + 4 * std::abs(exact) * 0x1p-23 + 5000 * 0x1p-23) << v;  // half a step, floats
+    }
+  }
+}
+
 TEST(ComponentsGlb, AConstantSceneNeedsNoBits) {
   BakedScene written = random_baked({.order = 2, .channels = 1});
   for (std::size_t i = 0; i < written.transfer.coefficients.size(); ++i)

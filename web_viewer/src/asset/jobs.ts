@@ -182,4 +182,5 @@ export interface Report {
     rays_per_vertex: number;
     certificate: { relrmse: number; interval?: [number, number]; sources?: Record<string, number> } | null;
   };
+  glossy?: Partial<Record<'radiance' | 'transport' | 'truncation', { relrmse: number; interval?: [number, number] }>>;
 }

@@ -15,8 +15,10 @@
 //     part.mesh.material.color.setRGB(...part.albedo);
 //   }
 //
-// What leaves the surface is  albedo * value + emission.  Basis: real spherical harmonics without the Condon-Shortley phase in
-// world axes (+Y up), index i = l(l+1)+m: three's own LightProbe convention. core/artifact/README.md specifies the format.
+// What leaves the surface is  albedo * value + emission.  Basis: real spherical harmonics without the Condon-Shortley
+// phase in world axes (+Y up), index i = l(l+1)+m: three's own LightProbe convention. core/artifact/README.md specifies
+// the format. Parts with `glossy` have transfer matrices too: arrivingLight() gives the light that their lobes reflect,
+// and "Specular parts" there says how.
 
 import type { BufferAttribute, BufferGeometry, Mesh, Object3D } from 'three';
 
@@ -32,9 +34,22 @@ export interface RadianceTransferExtension {
   attributes: string[];
   scale: number[];
   offset: number[];
+  glossy?: GlossyExtension;
   light?: { name?: string; coefficients?: number[][] };
   look?: { exposure?: number; toneMap?: string };
   units?: string;
+}
+
+/// Transfer matrices of specular parts: what arrives at a vertex, order^2 coefficients of it.
+export interface GlossyExtension {
+  order: number;
+  channels: 1 | 3;
+  fixed: boolean;
+  components: { rank: number; bufferView: number };
+  attributes: string[];
+  scale: number[];
+  offset: number[];
+  lobes: { rows: number; views: number; bufferView: number };
 }
 
 export interface TransferPart {
@@ -43,6 +58,7 @@ export interface TransferPart {
   albedo: [number, number, number]; // base colour factor; the map multiplies it; `_albedo`, if there, replaces it per vertex
   emission: [number, number, number]; // where it has no texture; a textured one is the original material's
   material: number; // index of the original material, -1 if none
+  glossy: boolean; // it has `_GLOSSY_k`
 }
 
 /// What the stored numbers of a vertex mean.
@@ -53,6 +69,8 @@ export interface StoredTransfer extends RadianceTransferExtension {
 export interface RadianceTransfer extends StoredTransfer {
   parts: TransferPart[];
   bakedLight: Float32Array; // see bakedLight()
+  arriving: StoredTransfer[]; // see arrivingTransfers(); none: nothing is specular
+  lobes: Float32Array; // (rows x views) x (3 + 5 (order - 1)) numbers
 }
 
 /// The part of GLTFLoader's result that is read here.
@@ -73,9 +91,11 @@ export function readExtension(json: unknown): RadianceTransferExtension | undefi
 export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTransfer | undefined> {
   const extension = readExtension(gltf.parser.json);
   if (!extension) return undefined;
-  const rows = extension.components
-    ? componentRows(extension, await gltf.parser.getDependency('bufferView', extension.components.bufferView))
-    : new Float32Array(0);
+  const view = (index: number) => gltf.parser.getDependency('bufferView', index);
+  const { components, glossy } = extension;
+  const rows = components ? componentRows(extension, await view(components.bufferView)) : new Float32Array(0);
+  const arriving = glossy ? arrivingTransfers(glossy, await view(glossy.components.bufferView)) : [];
+  const lobes = glossy ? lobeTable(glossy, await view(glossy.lobes.bufferView)) : new Float32Array(0);
   const parts: TransferPart[] = [];
   gltf.scene.traverse((object) => {
     const mesh = object as Mesh;
@@ -88,9 +108,10 @@ export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTr
       albedo: own.albedo ?? [1, 1, 1],
       emission: own.emission ?? [0, 0, 0],
       material: own.material ?? -1,
+      glossy: own.glossy ?? false,
     });
   });
-  return { ...extension, parts, rows, bakedLight: bakedLight(extension) };
+  return { ...extension, parts, rows, arriving, lobes, bakedLight: bakedLight(extension) };
 }
 
 /// light[3 * i + channel] of the bake; empty when it had no environment.
@@ -98,12 +119,40 @@ export const bakedLight = ({ light }: RadianceTransferExtension): Float32Array =
   Float32Array.from((light?.coefficients ?? []).flat());
 
 /// The mean and the rows of the components, from the bytes of their buffer view (little endian). Throws on another size.
-export function componentRows(e: RadianceTransferExtension, bytes: ArrayBuffer): Float32Array {
-  const count = ((e.components?.rank ?? 0) + 1) * e.channels * e.slots;
-  if (bytes.byteLength !== 4 * count) throw new Error(`${kName}: the buffer view does not hold its components`);
+export const componentRows = (e: RadianceTransferExtension, bytes: ArrayBuffer): Float32Array =>
+  floatsOf(bytes, ((e.components?.rank ?? 0) + 1) * e.channels * e.slots);
+
+function floatsOf(bytes: ArrayBuffer, count: number): Float32Array {
+  if (bytes.byteLength !== 4 * count) throw new Error(`${kName}: a buffer view does not hold its numbers`);
   const view = new DataView(bytes);
   return Float32Array.from({ length: count }, (_, i) => view.getFloat32(4 * i, true));
 }
+
+/// The matrices as order^2 transfer vectors that share their stored numbers: the o-th gives coefficient o of what
+/// arrives. `bytes`: of the view of their components. Throws on another size.
+export function arrivingTransfers(e: GlossyExtension, bytes: ArrayBuffer): StoredTransfer[] {
+  const outputs = e.order * e.order;
+  const inputs = outputs + (e.fixed ? 1 : 0);
+  const matrix = e.channels * outputs * inputs;
+  const all = floatsOf(bytes, (e.components.rank + 1) * matrix);
+  const stride = e.channels * inputs;
+  return Array.from({ length: outputs }, (_, o) => {
+    const rows = new Float32Array((e.components.rank + 1) * stride);
+    for (let to = 0; to < rows.length; to += inputs) {
+      const [row, c] = [Math.floor(to / stride), (to % stride) / inputs];
+      const from = row * matrix + (c * outputs + o) * inputs;
+      rows.set(all.subarray(from, from + inputs), to);
+    }
+    return { ...e, version: 2, slots: inputs, form: 'components', rows };
+  });
+}
+
+/// How a GGX surface reflects. `bytes`: of their view.
+export const lobeTable = ({ order, lobes }: GlossyExtension, bytes: ArrayBuffer): Float32Array =>
+  floatsOf(bytes, lobes.rows * lobes.views * lobeWidth(order));
+
+/// Numbers of an entry: a, b, the constant gain, and five for each band above.
+export const lobeWidth = (order: number): number => 3 + 5 * (order - 1);
 
 function checkShape(e: RadianceTransferExtension): void {
   const slots = e.order * e.order + (e.fixed ? 1 : 0);
@@ -119,11 +168,32 @@ function checkShape(e: RadianceTransferExtension): void {
     e.offset?.length === numbers &&
     e.attributes?.length === Math.ceil(numbers / 4);
   if (e.version !== 2) throw new Error(`${kName} version ${e.version} is not the one this reader knows`);
-  if (!good) throw new Error(`${kName} does not describe its own attributes`);
+  if (!good || (e.glossy && !isSound(e.glossy, e.order)))
+    throw new Error(`${kName} does not describe its own attributes`);
+}
+
+function isSound(g: GlossyExtension, most: number): boolean {
+  const rank = g.components?.rank;
+  return (
+    Number.isInteger(g.order) &&
+    g.order >= 1 &&
+    g.order <= Math.min(most, 5) &&
+    (g.channels === 1 || g.channels === 3) &&
+    Number.isInteger(rank) &&
+    rank >= 1 &&
+    g.scale?.length === rank &&
+    g.offset?.length === rank &&
+    g.attributes?.length === Math.ceil(rank / 4) &&
+    g.lobes?.rows === 16 &&
+    g.lobes.views === 32
+  );
 }
 
 /// The `_PRT_k` arrays of a geometry, four numbers each. GLTFLoader lower-cases attribute names.
-export function transferAttributes(e: RadianceTransferExtension, geometry: BufferGeometry): Float32Array[] {
+export function transferAttributes(
+  e: Pick<RadianceTransferExtension, 'attributes'>,
+  geometry: BufferGeometry,
+): Float32Array[] {
   return e.attributes.map((name) => {
     const attribute = geometry.getAttribute(name.toLowerCase()) as BufferAttribute | undefined;
     if (!attribute || attribute.itemSize !== 4) throw new Error(`${kName}: a primitive lacks ${name}`);
@@ -140,7 +210,26 @@ export const lightValues = (
   lamps = true,
 ): Float32Array => lightOfStored(e, transferAttributes(e, geometry), light, lamps);
 
-/// The same from the `_PRT_k` arrays themselves. `out` may be given for reuse.
+/// Light that arrives at the vertices of a specular part, from the half space of their normals, as SH coefficients in
+/// world axes: out[4 * (v * order^2 + o) + channel], the fourth number 0. `attributes`: its `_GLOSSY_k` arrays.
+export function arrivingLight(
+  arriving: readonly StoredTransfer[],
+  attributes: readonly Float32Array[],
+  light: ArrayLike<number>,
+  lamps: boolean,
+): Float32Array {
+  const vertices = attributes[0].length / 4;
+  const out = new Float32Array(4 * vertices * arriving.length);
+  const one = new Float32Array(3 * vertices);
+  arriving.forEach((transfer, o) => {
+    lightOfStored(transfer, attributes, light, lamps, one);
+    for (let from = 0, to = 4 * o; from < one.length; from += 3, to += 4 * arriving.length)
+      [out[to], out[to + 1], out[to + 2]] = [one[from], one[from + 1], one[from + 2]];
+  });
+  return out;
+}
+
+/// The same as lightValues() from the `_PRT_k` arrays themselves. `out` may be given for reuse.
 export function lightOfStored(
   e: StoredTransfer,
   attributes: readonly Float32Array[],

@@ -5,11 +5,18 @@
 
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
-import { componentRows, readExtension, type RadianceTransferExtension, type StoredTransfer } from './kiln_reader';
+import {
+  arrivingTransfers,
+  componentRows,
+  readExtension,
+  type RadianceTransferExtension,
+  type StoredTransfer,
+} from './kiln_reader';
 
 /// One baked primitive. Its vertices are in the order of the GLB's.
 export interface BakedPrimitive {
   stored: Float32Array[]; // its `_PRT_k`, four numbers of each vertex
+  weights: Float32Array[]; // its `_GLOSSY_k` alike; none: it has no matrices
   positions: Float32Array;
   indices: Uint32Array;
 }
@@ -17,6 +24,7 @@ export interface BakedPrimitive {
 export interface Unpacked {
   file: ArrayBuffer;
   transfer: StoredTransfer;
+  arriving: StoredTransfer[]; // of the matrices, if there are any
   baked: BakedPrimitive[]; // in the order of the file
 }
 
@@ -77,18 +85,21 @@ export function readPacked(file: ArrayBuffer): Packed {
 /// Uses up `packed`. Throws as readPacked does.
 export function unpack(draco: DracoModule, { json, binary, extension }: Packed): Unpacked {
   const transfer = { ...extension, rows: rowsOf(extension, json, binary) };
+  const { components, glossy } = extension;
+  const bytesIn = (index: number) => bytesOf(json, binary, index);
+  const arriving = glossy ? arrivingTransfers(glossy, bytesIn(glossy.components.bufferView).slice().buffer) : [];
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
   const out = new Binary();
   moveImages(json, binary, out);
-  if (extension.components)
-    extension.components.bufferView = out.add(bytesOf(json, binary, extension.components.bufferView));
+  for (const moved of [components, glossy?.components, glossy?.lobes])
+    if (moved) moved.bufferView = out.add(bytesIn(moved.bufferView));
   const accessors: Accessor[] = [];
   for (const [bytes, sharing] of byCompressedBytes(primitives, json, binary)) {
     const mesh = new DracoMesh(draco, bytes);
     try {
       for (const primitive of sharing) {
-        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension.attributes));
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension));
         makePlain(primitive, json, mesh, { accessors, out });
       }
     } finally {
@@ -103,6 +114,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   return {
     file: joinGlb(json, out.pieces),
     transfer,
+    arriving,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
   };
 }
@@ -171,16 +183,18 @@ function byCompressedBytes(
   return [...groups.values()];
 }
 
-/// Takes the transfer vectors, and what stands for them, out of the primitive.
-function takeBaked(primitive: Primitive, mesh: DracoMesh, names: readonly string[]): BakedPrimitive {
+/// Takes the transfer vectors and matrices, and what stands for them, out of the primitive.
+function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTransferExtension): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
   const floatsOf = (name: string, components: number) => {
     if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
     return mesh.floats(ids[name], components);
   };
-  const stored = names.map((name) => floatsOf(name, 4));
-  for (const name of [...names, 'COLOR_0']) delete primitive.attributes[name];
-  return { stored, positions: floatsOf('POSITION', 3), indices: mesh.indices() };
+  const own = primitive.extensions!.KILN_radiance_transfer as { glossy?: boolean };
+  const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
+  const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
+  for (const name of [...names, ...matrices, 'COLOR_0']) delete primitive.attributes[name];
+  return { stored, weights, positions: floatsOf('POSITION', 3), indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

@@ -46,6 +46,7 @@ export type Request =
 
 export interface ValuesReply {
   values: Float32Array[]; // one per part
+  arriving: Float32Array[]; // of a relight request, see arrivingLight(): one per part, empty where it has no matrices
   range: number; // where a colour scale should end; of a level request the level
   milliseconds: number; // spent computing
 }

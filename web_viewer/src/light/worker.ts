@@ -1,10 +1,18 @@
 // The light worker: opens one asset, holds its transfer vectors and answers messages.ts.
 
 import { loadDraco } from '../asset/draco_module';
-import { lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
+import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
 import { projectEquirect, shrinkEquirect } from './equirect';
-import type { OpenRequest, ProjectReply, ProjectRequest, Reply, Request, ValuesReply } from './messages';
+import type {
+  OpenRequest,
+  ProjectReply,
+  ProjectRequest,
+  RelightRequest,
+  Reply,
+  Request,
+  ValuesReply,
+} from './messages';
 import { coefficientsOf, pickCoefficient, quantile, triangleMeasure } from './transfer';
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
@@ -14,17 +22,24 @@ const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
 
 let transfer: StoredTransfer; // of the open file
+let arriving: StoredTransfer[] = []; // of its matrices
 let parts: BakedPrimitive[] = [];
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
 async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
   const unpacked = unpack(await decoder, readPacked(file));
-  [transfer, parts] = [unpacked.transfer, unpacked.baked];
+  [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
   return unpacked.file;
 }
 
 const relight = (light: Float32Array, lamps: boolean, reuse: Float32Array[]): Float32Array[] =>
   parts.map(({ stored }, i) => lightOfStored(transfer, stored, light, lamps, reuse[i]));
+
+/// What arrives at the parts that have matrices; nothing for others.
+const arrive = (light: Float32Array, lamps: boolean): Float32Array[] =>
+  parts.map(({ weights }) =>
+    weights.length > 0 ? arrivingLight(arriving, weights, light, lamps) : new Float32Array(0),
+  );
 
 /// Lamps count: they are there whatever the sky.
 function level(light: Float32Array): number {
@@ -65,15 +80,21 @@ function timed(compute: () => Float32Array[], ranged: boolean): ValuesReply {
   const start = performance.now();
   const values = compute();
   const milliseconds = performance.now() - start;
-  return { values, range: ranged ? rangeOf(values) : 0, milliseconds };
+  return { values, arriving: [], range: ranged ? rangeOf(values) : 0, milliseconds };
+}
+
+function relit({ light, lamps, reuse }: RelightRequest): ValuesReply {
+  const start = performance.now();
+  const [values, arriving] = [relight(light, lamps, reuse), arrive(light, lamps)];
+  return { values, arriving, range: 0, milliseconds: performance.now() - start };
 }
 
 function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): ValuesReply {
   switch (request.kind) {
     case 'relight':
-      return timed(() => relight(request.light, request.lamps, request.reuse), false);
+      return relit(request);
     case 'level':
-      return { values: [], range: level(request.light), milliseconds: 0 };
+      return { values: [], arriving: [], range: level(request.light), milliseconds: 0 };
     case 'measure':
       return timed(() => measure(request.weighted), true);
     case 'coefficient':
@@ -96,7 +117,7 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);
     } else {
       const values = compute(data);
-      send({ serial, values }, values.values.map((array) => array.buffer));
+      send({ serial, values }, [...values.values, ...values.arriving].map((array) => array.buffer));
     }
   } catch (error) {
     send({ serial, failure: error instanceof Error ? error.message : String(error) });

@@ -5,6 +5,7 @@ import {
   BufferAttribute,
   type BufferGeometry,
   Color,
+  type DataTexture,
   DynamicDrawUsage,
   type InterleavedBufferAttribute,
   type Material,
@@ -17,7 +18,8 @@ import {
 } from 'three';
 import { readRadianceTransfer, type RadianceTransfer, type TransferPart } from '../asset/kiln_reader';
 import type { LoadedAsset } from '../asset/parse_gltf';
-import { bakedMaterial, type Glow } from '../shaders/baked_material';
+import { bakedMaterial, type Finish, type Glow } from '../shaders/baked_material';
+import { listTexture, lobeTexture } from '../shaders/mirror';
 
 export interface BakedPart {
   mesh: Mesh<BufferGeometry, Material>;
@@ -45,7 +47,10 @@ export class BakedModel {
     const transfer = await readRadianceTransfer(asset.gltf);
     if (!transfer || transfer.parts.length === 0) throw new Error('this glTF carries no KILN_radiance_transfer');
     const model = new BakedModel(asset, transfer);
-    for (const part of transfer.parts) model.parts.push(await model.dress(part, asset));
+    const { glossy } = transfer;
+    const lobes = glossy ? lobeTexture(transfer.lobes, glossy.order) : null;
+    if (lobes) model.owned.add(lobes);
+    for (const part of transfer.parts) model.parts.push(await model.dress(part, asset, lobes));
     return model;
   }
 
@@ -73,16 +78,27 @@ export class BakedModel {
     });
   }
 
+  /// Shows new light that arrives at parts with matrices; one array for each part.
+  setArriving(arriving: Float32Array[]): void {
+    this.parts.forEach(({ material }, i) => {
+      if (!arriving[i]?.length) return;
+      (material.uniforms.arriving.value as DataTexture | null)?.dispose();
+      material.uniforms.arriving.value = listTexture(arriving[i]);
+    });
+  }
+
   setWhite(white: boolean): void {
     for (const { material } of this.parts) material.uniforms.white.value = white;
   }
 
-  private async dress(part: TransferPart, asset: LoadedAsset): Promise<BakedPart> {
+  private async dress(part: TransferPart, asset: LoadedAsset, lobes: DataTexture | null): Promise<BakedPart> {
     const geometry = part.geometry;
     const unlit = part.mesh.material as MeshBasicMaterial;
     const glow = await loadGlow(asset, part.material);
     this.owned.add(unlit);
     if (glow) this.owned.add(glow.map);
+    const finish = part.glossy && lobes ? await this.loadFinish(asset, part.material, lobes) : null;
+    if (finish?.map) this.owned.add(finish.map);
     const light = new BufferAttribute(new Float32Array(3 * geometry.getAttribute('position').count), 3);
     geometry.setAttribute('light', light.setUsage(DynamicDrawUsage));
     const material = bakedMaterial({
@@ -91,15 +107,29 @@ export class BakedModel {
       albedo: part.albedo,
       emission: part.emission,
       vertexAlbedo: geometry.hasAttribute('_albedo'),
+      finish,
     });
     part.mesh.material = material;
     return { mesh: part.mesh as BakedPart['mesh'], material, light, normal: geometry.getAttribute('normal') };
+  }
+
+  /// Metalness and roughness of an original material.
+  private async loadFinish({ gltf }: LoadedAsset, material: number, lobes: DataTexture): Promise<Finish> {
+    const definition = (gltf.parser.json as { materials?: GltfMaterial[] }).materials?.[material];
+    const finish = definition?.pbrMetallicRoughness ?? {};
+    const { metallicFactor = 1, roughnessFactor = 1, metallicRoughnessTexture } = finish;
+    const loaded: { map?: Texture } = {};
+    if (metallicRoughnessTexture) await gltf.parser.assignTexture(loaded, 'map', metallicRoughnessTexture);
+    const order = this.transfer.glossy!.order;
+    const arriving = listTexture(new Float32Array(0));
+    return { metallic: metallicFactor, roughness: roughnessFactor, map: loaded.map ?? null, arriving, lobes, order };
   }
 
   dispose(): void {
     this.root.removeFromParent();
     for (const { mesh, material } of this.parts) {
       mesh.geometry.dispose();
+      (material.uniforms.arriving.value as Texture | null)?.dispose();
       material.dispose();
     }
     disposeAll(this.owned);
@@ -119,6 +149,11 @@ async function loadGlow({ gltf }: LoadedAsset, material: number): Promise<Glow |
 }
 
 interface GltfMaterial {
+  pbrMetallicRoughness?: {
+    metallicFactor?: number;
+    roughnessFactor?: number;
+    metallicRoughnessTexture?: { index: number };
+  };
   emissiveTexture?: { index: number };
   emissiveFactor?: [number, number, number];
   extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number } };

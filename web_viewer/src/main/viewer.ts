@@ -161,6 +161,7 @@ export class Viewer {
     const { light, rotation, intensity, lamps } = this.state.get();
     const reply = await this.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, this.spare);
     this.spare = this.model.setLight(reply.values);
+    this.model.setArriving(reply.arriving);
     this.relitMilliseconds = reply.milliseconds;
     this.stage.requestDraw();
   }

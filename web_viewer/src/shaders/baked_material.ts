@@ -1,9 +1,13 @@
 // The material of baked light:  radiance = albedo * value + emission, then exposure, tone mapping and sRGB.
+// Where a part has matrices (mirror.ts):
+//   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission
+//   F0 = mix(0.04, albedo, metallic)
 //
 // `value` (attribute `light`, linear RGB) was computed by the light worker; nothing here depends on the number of coefficients.
 // Exposure and tone mapping are three's (renderer.toneMapping): the same for baked and original materials.
 
 import { Color, type Material, Matrix3, type MeshBasicMaterial, ShaderMaterial, type Texture } from 'three';
+import { lobeFunctions, lobeTexels, mirrorFunctions } from './mirror';
 
 const vertexShader = /* glsl */ `
 attribute vec3 light;
@@ -24,8 +28,32 @@ uniform mat3 emissionMapTransform;
 varying vec2 vEmissionUv;
 #endif
 
+#ifdef MIRROR
+uniform float roughness;
+varying vec3 vMirror;
+varying vec3 vNormal;
+varying vec3 vToEye;
+#ifdef FINISH_MAP
+uniform sampler2D finishMap;
+uniform mat3 finishMapTransform;
+varying vec2 vFinishUv;
+#endif
+${lobeFunctions}
+${mirrorFunctions}
+#endif
+
 void main() {
   vLight = light;
+#ifdef MIRROR
+  float rough = roughness;
+#ifdef FINISH_MAP
+  vFinishUv = (finishMapTransform * vec3(FINISH_UV, 1.0)).xy;
+  rough *= textureLod(finishMap, vFinishUv, 0.0).g;
+#endif
+  vNormal = mat3(modelMatrix) * normal;
+  vToEye = cameraPosition - (modelMatrix * vec4(position, 1.0)).xyz;
+  vMirror = mirrorAt(gl_VertexID, normalize(vNormal), normalize(vToEye), rough);
+#endif
 #ifdef VERTEX_ALBEDO
   vAlbedo = _albedo;
 #endif
@@ -56,6 +84,30 @@ varying vec2 vAlbedoUv;
 uniform sampler2D emissionMap;
 varying vec2 vEmissionUv;
 #endif
+#ifdef MIRROR
+uniform float metallic;
+uniform float roughness;
+varying vec3 vMirror;
+varying vec3 vNormal;
+varying vec3 vToEye;
+#ifdef FINISH_MAP
+uniform sampler2D finishMap;
+varying vec2 vFinishUv;
+#endif
+${lobeFunctions}
+/// What a surface of this base colour sends to the eye.
+vec3 reflected(vec3 base, vec3 value) {
+  vec2 finish = vec2(roughness, metallic);
+#ifdef FINISH_MAP
+  finish *= texture2D(finishMap, vFinishUv).gb;
+#endif
+  vec2 ab = lobeAt(dot(normalize(vNormal), normalize(vToEye)), finish.x, 0).xy;
+  vec3 f0 = mix(vec3(0.04), base, finish.y);
+  return (1.0 - finish.y) * base * (1.0 - 0.04 * ab.x - ab.y) * value + (f0 * ab.x + ab.y) * vMirror;
+}
+#else
+vec3 reflected(vec3 base, vec3 value) { return base * value; }
+#endif
 #include <common>
 #include <dithering_pars_fragment>
 
@@ -75,7 +127,7 @@ void main() {
 #endif
   // Spherical harmonics ring: a point in deep shadow may come out a little below zero.
   vec3 value = max(vLight, vec3(0.0));
-  gl_FragColor = vec4(white ? value : base.rgb * value + emitted, base.a);
+  gl_FragColor = vec4(white ? value : reflected(base.rgb, value) + emitted, base.a);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
   #include <dithering_fragment>
@@ -87,12 +139,23 @@ export interface Glow {
   factor: Color;
 }
 
+/// How a part with matrices reflects. The textures belong to the model.
+export interface Finish {
+  metallic: number;
+  roughness: number;
+  map: Texture | null; // G roughness, B metallic, as in glTF
+  arriving: Texture; // listTexture() of what arrives
+  lobes: Texture;
+  order: number; // of the matrices
+}
+
 export interface BakedLook {
   unlit: MeshBasicMaterial; // of scene 0: base colour texture, alpha mode, sides
   glow: Glow | null; // emission through a texture
   albedo: readonly number[];
   emission: readonly number[];
   vertexAlbedo: boolean;
+  finish: Finish | null; // it has matrices
 }
 
 const uvOf = (map: Texture): string => (map.channel === 1 ? 'uv1' : 'uv');
@@ -104,13 +167,19 @@ const transformOf = (map?: Texture | null): Matrix3 => {
 };
 
 /// Owns only itself; the textures belong to the model.
-export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo }: BakedLook): ShaderMaterial {
-  const [albedoMap, emissionMap] = [unlit.map, glow?.map ?? null];
+export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, finish }: BakedLook): ShaderMaterial {
+  const [albedoMap, emissionMap, finishMap] = [unlit.map, glow?.map ?? null, finish?.map ?? null];
   const defines: Record<string, string> = {};
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (albedoMap) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(albedoMap)];
   if (emissionMap) [defines.EMISSION_MAP, defines.EMISSION_UV] = ['', uvOf(emissionMap)];
-  if (albedoMap?.channel === 1 || emissionMap?.channel === 1) defines.USE_UV1_SET = '';
+  if (finishMap) [defines.FINISH_MAP, defines.FINISH_UV] = ['', uvOf(finishMap)];
+  if ([albedoMap, emissionMap, finishMap].some((map) => map?.channel === 1)) defines.USE_UV1_SET = '';
+  if (finish) {
+    defines.MIRROR = '';
+    defines.MIRROR_ORDER = `${finish.order}`;
+    defines.LOBE_TEXELS = `${lobeTexels(finish.order)}`;
+  }
   return new ShaderMaterial({
     name: unlit.name,
     dithering: true, // soft shadows show bands in 8 bits
@@ -127,6 +196,12 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo }: B
       albedoMapTransform: { value: transformOf(albedoMap) },
       emissionMap: { value: emissionMap },
       emissionMapTransform: { value: transformOf(emissionMap) },
+      metallic: { value: finish?.metallic ?? 0 },
+      roughness: { value: finish?.roughness ?? 1 },
+      finishMap: { value: finishMap },
+      finishMapTransform: { value: transformOf(finishMap) },
+      arriving: { value: finish?.arriving ?? null },
+      lobes: { value: finish?.lobes ?? null },
     },
     ...sides(unlit),
   });

@@ -13,6 +13,7 @@ export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   if (report.certificate?.relrmse !== undefined)
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
   if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
+  if (report.glossy?.radiance) box.append(h('h3', {}, 'Specular parts'), pairs(specular(report.glossy)));
   if (report.warnings?.length)
     box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
   if (report.plan?.length) box.append(h('h3', {}, 'Plan'), plan(report.plan));
@@ -82,6 +83,15 @@ function grid(of: NonNullable<Report['grid']>): Row[] {
     ['Rays per vertex', count(rays)],
     ...(c ? [['Relative error', withInterval(c)] as const] : []),
     ['from noise, lattice, storage', ['noise', 'lattice', 'storage'].map(from).join(', ')],
+  ];
+}
+
+/// The certificate of matrices, with eyes all around.
+function specular({ radiance, transport, truncation }: NonNullable<Report['glossy']>): Row[] {
+  return [
+    ...(radiance ? [['Towards random eyes', withInterval(radiance)] as const] : []),
+    ...(transport ? [['from the bake', withInterval(transport)] as const] : []),
+    ...(truncation ? [['from the lobe cut by the order', withInterval(truncation)] as const] : []),
   ];
 }
 

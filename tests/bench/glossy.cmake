@@ -1,0 +1,5 @@
+if(TARGET kiln_bake)
+  add_executable(kiln_glossy glossy.cpp)
+  kiln_flags(kiln_glossy)
+  target_link_libraries(kiln_glossy PRIVATE kiln_bake Eigen3::Eigen)
+endif()
