@@ -209,8 +209,8 @@ GlossyCertificate certify_glossy(const BakedScene& decoded, const Tracer& truth,
   constexpr double kPathsOfRay = 0.05 / 18 / kPoints;
   out.samples = static_cast<int>(std::clamp(kPathsOfRay * static_cast<double>(options.bake_rays), 64.0, 1024.0));
   const ReferenceOptions paths{.samples = out.samples, .seed = mix64(options.seed ^ 0x6c6f6265ULL)};
-  const ReferenceOptions again{.samples = out.samples, .seed = mix64(paths.seed)},
-      more{out.samples, -1, mix64(again.seed)};
+  const ReferenceOptions again{.samples = out.samples, .seed = mix64(paths.seed)};
+  const ReferenceOptions more{.samples = out.samples, .seed = mix64(again.seed)};
   Truths truths{.specular = trace_specular(truth, eyes.truth, light, again, threads),
                 .bands = trace_kernels(truth, {eyes.truth, eyes.kernel}, light, more, threads)};
   // Metals have nothing below.
