@@ -83,8 +83,8 @@ double rough_share(const Plan& plan, double exact_rays) {
 // Of a reflected ray, its hit and what it gathers, against a ray for distant light and its share of projection: 2
 // (scans in the open) to 5 (dungeon) were measured.
 constexpr double kReflectedPrice = 3.4;
-// Vertices of little surface take fewer rays (interreflection.cpp): .40 to .77 of them on five scenes that were split.
-constexpr double kSplitShare = 0.6;
+// Vertices of little surface take fewer rays (interreflection.cpp): .74 to .96 of them on four scenes that were split.
+constexpr double kSplitShare = 0.8;
 
 double stored_bytes_of_vertex(const Plan& plan, double slots) {
   constexpr double kFixed = 3, kSeesNoSky = 0.005;

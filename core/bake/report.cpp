@@ -256,7 +256,6 @@ std::string report_json(const ReportInput& in) {
   if (in.recipe.promise)
     out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
-  if (in.recipe.promise) out["promise"] = promise_object(in.recipe.promise, in.passes);
   return text_of(out);
 }
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
@@ -25,24 +26,24 @@ constexpr int kLatePasses = 2, kEarlyShare = 4;
 int early_samples(const Interreflection& params) { return std::max(1, params.samples / kEarlyShare); }
 
 // The error is a mean over the surface, so that noise at a vertex of little surface hardly counts: rays in proportion
-// to the root of the area around it leave the least for their number (Lagrange). No vertex takes more than `samples`,
-// and none fewer than a sixteenth, so that whoever looks closely sees no speckles.
-constexpr std::array<int, 3> kShares = {1, 4, 16};
+// to the root of the area around it leave the least for their number (Lagrange). Little is what is small beside the
+// median, so that a model on a large floor keeps its rays. No vertex takes fewer than a quarter of them: whoever looks
+// closely finds at most twice the noise.
+constexpr std::array<int, 3> kShares = {1, 2, 4};
 
-/// Index into kShares of each vertex: the share nearest to the root of its area over the mean.
+/// Index into kShares of each vertex: the share nearest to the root of its area over the median.
 std::vector<std::uint8_t> shares_of(const Mesh& mesh) {
-  std::vector<double> area(mesh.position.size());
-  double all = 0;
+  std::vector<float> area(mesh.position.size());
   for (const Triangle& t : mesh.triangles) {
-    const double third = triangle_area(mesh, t) / 3;
-    for (const std::uint32_t v : t) area[v] += third;
-    all += 3 * third;
+    for (const std::uint32_t v : t) area[v] += static_cast<float>(triangle_area(mesh, t));
   }
-  const double mean = all / static_cast<double>(std::max<std::size_t>(area.size(), 1));
+  std::vector<float> sorted = area;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
   std::vector<std::uint8_t> out;
-  for (const double a : area) {
-    const double root = std::sqrt(a / mean);
-    out.push_back(root > 0.5 ? 0 : root > 0.125 ? 1 : 2);
+  for (const float a : area) {
+    const float root = std::sqrt(a / std::max(*middle, std::numeric_limits<float>::min()));
+    out.push_back(root > 0.7F ? 0 : root > 0.35F ? 1 : 2);
   }
   return out;
 }

@@ -23,7 +23,7 @@ struct Interreflection {
   int order = 6;
   int bounces = 1;    // passes, >= 0
   int samples = 256;  // most closest-hit rays per vertex in each of the last two passes; a quarter of them before.
-                      // Vertices of little surface take as few as a sixteenth
+                      // Vertices of little surface take as few as a quarter
   std::uint64_t seed = 0;
   std::vector<StandIn> stand_ins = {};     // where hidden vertices gather instead; ascending
   std::vector<std::uint32_t> probes = {};  // vertices whose last pass is done twice, to see its noise
