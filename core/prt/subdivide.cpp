@@ -13,6 +13,7 @@
 #include "core/prt/row_store.h"
 #include "core/prt/split_measure.h"
 #include "core/prt/split_mesh.h"
+#include "core/prt/straddlers.h"
 
 namespace kiln {
 namespace {
@@ -92,6 +93,7 @@ class Subdivider {
       return difference(closed.point[a], closed.point[b]);
     };
     std::vector<StandIn> found = cut_pierced(closed, source_.pierced, contrast, params_.triangles, threads);
+    if (source_.hidden) light_straddlers(closed.mesh, found, source_.hidden, threads);
     closed.point.resize(closed.mesh.position.size());
     give_rows(found, closed);
     return found;
