@@ -1,6 +1,8 @@
 // The triangles' edges over the shaded model. Each edge once; the positions are the model's own.
+// While it stands the surfaces are moved back to leave it room. Not otherwise: the offset grows with a surface's slope,
+// and what lies behind a steep one would show through along its edges.
 
-import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments } from 'three';
+import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type Material } from 'three';
 import type { BakedModel } from './baked_model';
 
 export class Wireframe {
@@ -11,19 +13,26 @@ export class Wireframe {
     toneMapped: false,
   });
   private readonly lines: LineSegments[];
+  private readonly moved = new Set<Material>();
 
-  constructor(model: BakedModel) {
+  constructor(private readonly model: BakedModel) {
     this.lines = model.parts.map(({ mesh }) => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', mesh.geometry.getAttribute('position'));
       geometry.setIndex(new BufferAttribute(edgesOf(mesh.geometry.index!.array), 1));
       const lines = new LineSegments(geometry, this.material);
       mesh.add(lines);
+      mesh.onBeforeRender = (_renderer, _scene, _camera, _geometry, material) => {
+        material.polygonOffset = true;
+        this.moved.add(material);
+      };
       return lines;
     });
   }
 
   dispose(): void {
+    for (const { mesh } of this.model.parts) mesh.onBeforeRender = () => {};
+    for (const material of this.moved) material.polygonOffset = false;
     for (const lines of this.lines) {
       lines.removeFromParent();
       lines.geometry.deleteAttribute('position'); // the model's: it must outlive this geometry

@@ -11,7 +11,7 @@ import { lobeFunctions, lobeTexels, mirrorFunctions } from './mirror';
 
 const vertexShader = /* glsl */ `
 attribute vec3 light;
-varying vec3 vLight;
+centroid varying vec3 vLight;
 #ifdef VERTEX_ALBEDO
 attribute vec4 _albedo;
 varying vec4 vAlbedo;
@@ -30,7 +30,7 @@ varying vec2 vEmissionUv;
 
 #ifdef MIRROR
 uniform float roughness;
-varying vec3 vMirror;
+centroid varying vec3 vMirror;
 varying vec3 vNormal;
 varying vec3 vToEye;
 #ifdef FINISH_MAP
@@ -72,7 +72,7 @@ uniform float alpha;
 uniform float alphaCutoff;
 uniform vec3 emission;
 uniform bool white;
-varying vec3 vLight;
+centroid varying vec3 vLight;
 #ifdef VERTEX_ALBEDO
 varying vec4 vAlbedo;
 #endif
@@ -87,7 +87,7 @@ varying vec2 vEmissionUv;
 #ifdef MIRROR
 uniform float metallic;
 uniform float roughness;
-varying vec3 vMirror;
+centroid varying vec3 vMirror;
 varying vec3 vNormal;
 varying vec3 vToEye;
 #ifdef FINISH_MAP
@@ -211,7 +211,7 @@ const sides = ({ side, transparent, depthWrite }: Material) => ({
   side,
   transparent,
   depthWrite,
-  polygonOffset: true, // leaves room for the wireframe in front
+  // Used while a wireframe stands in front (wireframe.ts).
   polygonOffsetFactor: 1,
   polygonOffsetUnits: 1,
 });

@@ -36,7 +36,7 @@ export function falseColourMaterial(map: ColourMapName, range: readonly [number,
     fragmentShader,
     side: DoubleSide,
     toneMapped: false,
-    polygonOffset: true,
+    // Used while a wireframe stands in front (wireframe.ts).
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
     uniforms: { scale: { value: scale }, range: { value: range[0] < range[1] ? [...range] : [0, 1] } },

@@ -41,7 +41,7 @@ export function gridMaterial(textures: GridTextures, surface: boolean): ShaderMa
     defines: { ...textures.defines },
     uniforms: { ...textures.uniforms, albedo: { value: surface ? 1 : 0.8 }, surface: { value: surface } },
     side: surface ? DoubleSide : FrontSide,
-    polygonOffset: surface,
+    // Used while a wireframe stands in front (wireframe.ts).
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
