@@ -58,7 +58,7 @@ Warning too_sharp(int order, float smoothest, const std::string& names) {
           ""};
 }
 
-GlossyDecision decide(const Scene& scene, const std::vector<PartFinish>& finish, int order, std::string why) {
+GlossyDecision decide(const Scene& scene, const std::vector<PartFinish>& finish, int order, const std::string& why) {
   GlossyDecision out;
   float smoothest = 1;
   std::size_t count = 0;
