@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -214,9 +215,11 @@ std::vector<bool> opaque_triangles(const Scene& scene) {
 }
 
 /// Of each line: the square of the change of light across it, times the area that an uncut triangle would spread it
-/// over (the line's length times the size of the triangle).
+/// over (the line's length times the size of the triangle). Reflected light, which is not known yet, may change as
+/// well.
 std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines, const ValueSource& source) {
   constexpr std::size_t kBatch = 1024;
+  constexpr double kReflected = 1e-4;  // square of what it may change by: a thirtieth of an open point's constant band
   std::vector<double> out;
   out.reserve(lines.size());
   std::vector<TransferPoint> points;
@@ -229,7 +232,7 @@ std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines,
     const std::vector<float> values = source.rough ? source.rough(points) : source.values(points);
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const float* one = values.data() + 2 * i * source.width;
-      double squares = 0;
+      double squares = kReflected;
       for (std::size_t c = 0; c < source.width; ++c) squares += std::pow(one[c] - one[c + source.width], 2);
       const double size = std::sqrt(triangle_area(mesh, mesh.triangles[batch[i].triangle]));
       out.push_back(squares * length(batch[i]) * size);
@@ -238,15 +241,30 @@ std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines,
   return out;
 }
 
+/// The lines at which somebody can see one of the two sides.
+std::vector<ContactLine> seen_lines(const Mesh& mesh, std::vector<ContactLine> lines, const HiddenTest& hidden,
+                                    Threads& threads) {
+  if (!hidden) return lines;
+  std::vector<char> seen(lines.size());
+  threads.for_blocks(lines.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [one, other] = beside_line(mesh, lines[i]);
+      seen[i] = !hidden(one) || !hidden(other) ? 1 : 0;
+    }
+  });
+  std::erase_if(lines,
+                [&](const ContactLine& line) { return seen[static_cast<std::size_t>(&line - lines.data())] == 0; });
+  return lines;
+}
+
 }  // namespace
 
 Mesh cut_where_light_jumps(const Scene& scene, const ValueSource& source, std::uint64_t budget, Threads& threads) {
-  const std::vector<ContactLine> lines = find_contact_lines(scene.mesh, opaque_triangles(scene), threads);
+  const std::vector<ContactLine> lines =
+      seen_lines(scene.mesh, find_contact_lines(scene.mesh, opaque_triangles(scene), threads), source.hidden, threads);
   const std::vector<double> worth = worths(scene.mesh, lines, source);
-  std::vector<std::uint32_t> order;
-  for (std::uint32_t i = 0; i < lines.size(); ++i) {
-    if (worth[i] > 0) order.push_back(i);
-  }
+  std::vector<std::uint32_t> order(lines.size());
+  std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, std::greater{}, [&](std::uint32_t i) { return worth[i]; });
   std::vector<ContactLine> sorted;
   for (const std::uint32_t i : order) sorted.push_back(lines[i]);

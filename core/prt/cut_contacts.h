@@ -23,7 +23,7 @@ namespace kiln {
 Mesh cut_contacts(const Mesh&, std::span<const ContactLine>, std::uint64_t budget, Threads&);
 
 /// Cuts a scene's mesh where opaque surfaces stand on it: first along the lines across which the light of `source`
-/// changes most over the most area. Where it does not change there is no cut.
+/// changes most over the most area; lines inside solids are left out.
 Mesh cut_where_light_jumps(const Scene&, const ValueSource& source, std::uint64_t budget, Threads&);
 
 }  // namespace kiln
