@@ -37,6 +37,7 @@ class WorkerProcess {
   /// The wait status once it has ended and was reaped.
   std::optional<int> try_wait();
   void signal(int number) const;  // to the whole group
+  /// Memory of its own: pages of files that it maps are the system's.
   std::uint64_t resident_bytes() const;
 
  private:

@@ -1,0 +1,226 @@
+#include "core/reduce/charts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <unordered_map>
+
+namespace kiln {
+namespace {
+
+using Point = Vec2<double>;
+using Flat = std::array<Point, 3>;
+
+double turn(const Point& a, const Point& b, const Point& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/// Whether the insides of two triangles with positive turn have a common point: no edge of either has all of the other
+/// on its outer side. `slack` is a doubled area that rounding may make of nothing.
+bool overlap(const Flat& a, const Flat& b, double slack) {
+  const auto parted = [&](const Flat& p, const Flat& q) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Point &from = p[i], &to = p[(i + 1) % 3];
+      if (turn(from, to, q[0]) <= slack && turn(from, to, q[1]) <= slack && turn(from, to, q[2]) <= slack) return true;
+    }
+    return false;
+  };
+  return !parted(a, b) && !parted(b, a);
+}
+
+class Splitter {
+ public:
+  Splitter(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles)
+      : position_(position), triangles_(triangles) {
+    for (const Triangle& t : triangles) {
+      const Vec3d &a = position[t[0]], &b = position[t[1]], &c = position[t[2]];
+      area_.push_back(cross(b - a, c - a) * 0.5);
+      center_.push_back((a + b + c) / 3.0);
+    }
+  }
+
+  /// Leaves in the order of the tree.
+  std::vector<Chart> run() {
+    std::vector<std::uint32_t> all(triangles_.size());
+    std::iota(all.begin(), all.end(), 0U);
+    std::vector<Chart> charts;
+    std::vector<std::span<std::uint32_t>> stack{all};
+    while (!stack.empty()) {
+      const std::span<std::uint32_t> some = stack.back();
+      stack.pop_back();
+      if (some.empty()) continue;
+      Chart chart;
+      if (some.size() == 1 || lies_flat(some, chart)) {
+        if (some.size() == 1) set_frame(some, chart);
+        chart.triangles.assign(some.begin(), some.end());
+        std::sort(chart.triangles.begin(), chart.triangles.end());
+        shrink(chart);
+        charts.push_back(std::move(chart));
+        continue;
+      }
+      const std::size_t half = halve(some);
+      stack.push_back(some.subspan(half));
+      stack.push_back(some.first(half));
+    }
+    return charts;
+  }
+
+ private:
+  void set_frame(std::span<const std::uint32_t> some, Chart& chart) const {
+    Vec3d sum;
+    for (const std::uint32_t t : some) sum += area_[t];
+    chart.normal = normalized(sum);
+    const Basis<double> basis = basis_around(chart.normal);
+    chart.tangent = basis.x, chart.up = basis.y;
+  }
+
+  bool lies_flat(std::span<const std::uint32_t> some, Chart& chart) const {
+    set_frame(some, chart);
+    for (const std::uint32_t t : some) {
+      if (dot(area_[t], chart.normal) < kSteepest * length(area_[t])) return false;
+    }
+    return !folds(some, chart);
+  }
+
+  Flat flat(std::uint32_t t, const Chart& chart) const {
+    Flat out;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Vec3d& p = position_[triangles_[t][c]];
+      out[c] = {dot(chart.tangent, p), dot(chart.up, p)};
+    }
+    return out;
+  }
+
+  /// Whether two triangles overlap on the plane: pairs that meet in a cell of a grid are looked at.
+  bool folds(std::span<const std::uint32_t> some, const Chart& chart) const {
+    double area = 0;
+    for (const std::uint32_t t : some) area += length(area_[t]);
+    const double cell = 1.5 * std::sqrt(area / static_cast<double>(some.size())) + 1e-12;
+    const double slack = 1e-9 * cell * cell;
+    std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> grid;
+    std::vector<Flat> flats;
+    for (const std::uint32_t t : some) {
+      const Flat f = flat(t, chart);
+      const auto number = static_cast<std::uint32_t>(flats.size());
+      flats.push_back(f);
+      if (turn(f[0], f[1], f[2]) <= slack) continue;
+      const auto index = [&](double x) { return static_cast<std::int64_t>(std::floor(x / cell)); };
+      const auto [x0, x1] = std::minmax({f[0].x, f[1].x, f[2].x});
+      const auto [y0, y1] = std::minmax({f[0].y, f[1].y, f[2].y});
+      for (std::int64_t x = index(x0); x <= index(x1); ++x) {
+        for (std::int64_t y = index(y0); y <= index(y1); ++y) {
+          auto& list = grid[static_cast<std::uint64_t>(x) << 32 ^ (static_cast<std::uint64_t>(y) & 0xffffffffU)];
+          for (const std::uint32_t other : list) {
+            if (overlap(f, flats[other], slack)) return true;
+          }
+          list.push_back(number);
+        }
+      }
+    }
+    return false;
+  }
+
+  /// Puts the lower half of the centres along the longest side first. Returns its size.
+  std::size_t halve(std::span<std::uint32_t> some) const {
+    Vec3d low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (const std::uint32_t t : some) {
+      for (std::size_t a = 0; a < 3; ++a)
+        low[a] = std::min(low[a], center_[t][a]), high[a] = std::max(high[a], center_[t][a]);
+    }
+    const Vec3d size = high - low;
+    const std::size_t axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::size_t half = some.size() / 2;
+    std::nth_element(some.begin(), some.begin() + static_cast<std::ptrdiff_t>(half), some.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const double ca = center_[a][axis], cb = center_[b][axis];
+                       return ca != cb ? ca < cb : a < b;
+                     });
+    return half;
+  }
+
+  /// Turns the frame to the smallest rectangle of sixteen, lying rather than standing.
+  void shrink(Chart& chart) const {
+    constexpr int kTurns = 16;
+    const Vec3d x = chart.tangent, y = chart.up;
+    double best = HUGE_VAL;
+    for (int i = 0; i < kTurns; ++i) {
+      const double angle = 1.5707963267948966 * i / kTurns;
+      Chart turned{.normal = chart.normal,
+                   .tangent = x * std::cos(angle) + y * std::sin(angle),
+                   .up = y * std::cos(angle) - x * std::sin(angle)};
+      measure(chart, turned);
+      const double area = (turned.high.x - turned.low.x) * (turned.high.y - turned.low.y);
+      if (area >= best) continue;
+      best = area;
+      chart.tangent = turned.tangent, chart.up = turned.up, chart.low = turned.low, chart.high = turned.high;
+    }
+    if (chart.high.y - chart.low.y <= chart.high.x - chart.low.x) return;
+    const Vec3d tangent = chart.tangent;  // a quarter turn
+    chart.tangent = chart.up, chart.up = -tangent;
+    measure(chart, chart);
+  }
+  void measure(const Chart& of, Chart& frame) const {
+    frame.low = {HUGE_VAL, HUGE_VAL}, frame.high = {-HUGE_VAL, -HUGE_VAL};
+    for (const std::uint32_t t : of.triangles) {
+      for (const Point& p : flat(t, frame)) {
+        frame.low = {std::min(frame.low.x, p.x), std::min(frame.low.y, p.y)};
+        frame.high = {std::max(frame.high.x, p.x), std::max(frame.high.y, p.y)};
+      }
+    }
+  }
+
+  const std::vector<Vec3d>& position_;
+  const std::vector<Triangle>& triangles_;
+  std::vector<Vec3d> area_, center_;
+};
+
+/// Rectangles by falling height on shelves from the top down. False when they do not fit.
+bool pack(Atlas& atlas, double density, const std::vector<std::uint32_t>& by_height) {
+  int x = 0, y = 0, shelf = 0;
+  for (const std::uint32_t i : by_height) {
+    Chart& c = atlas.charts[i];
+    const auto texels = [&](double length) {
+      return static_cast<int>(std::ceil(length * density)) + 1 + 2 * atlas.padding;
+    };
+    c.width = texels(c.high.x - c.low.x), c.height = texels(c.high.y - c.low.y);
+    if (c.width > atlas.side) return false;
+    if (x + c.width > atlas.side) x = 0, y += shelf, shelf = 0;
+    shelf = std::max(shelf, c.height);
+    if (y + shelf > atlas.side) return false;
+    c.x = x, c.y = y;
+    x += c.width;
+  }
+  return true;
+}
+
+}  // namespace
+
+Atlas make_atlas(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles, int side) {
+  Atlas atlas{.side = side, .charts = Splitter(position, triangles).run()};
+  atlas.chart_of.resize(triangles.size());
+  std::vector<std::uint32_t> by_height(atlas.charts.size());
+  std::iota(by_height.begin(), by_height.end(), 0U);
+  double area = 0;
+  for (std::uint32_t c = 0; c < atlas.charts.size(); ++c) {
+    const Chart& chart = atlas.charts[c];
+    for (const std::uint32_t t : chart.triangles) atlas.chart_of[t] = c;
+    area += (chart.high.x - chart.low.x) * (chart.high.y - chart.low.y);
+  }
+  std::stable_sort(by_height.begin(), by_height.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return atlas.charts[a].high.y - atlas.charts[a].low.y > atlas.charts[b].high.y - atlas.charts[b].low.y;
+  });
+  // The largest density that fits, to a hundredth; padding shrinks where there are too many charts for it.
+  while (atlas.padding > 0 && !pack(atlas, 0, by_height)) --atlas.padding;
+  double low = 0, high = 2 * side / std::sqrt(std::max(area, 1e-12));
+  for (int i = 0; i < 24 && high - low > 0.01 * low; ++i) {
+    const double middle = 0.5 * (low + high);
+    (pack(atlas, middle, by_height) ? low : high) = middle;
+  }
+  atlas.density = low;
+  pack(atlas, low, by_height);
+  return atlas;
+}
+
+}  // namespace kiln
