@@ -60,7 +60,7 @@ class Splitter {
         charts.push_back(std::move(chart));
         continue;
       }
-      const std::size_t half = halve(some);
+      const std::size_t half = part(some, chart);
       stack.push_back(some.subspan(half));
       stack.push_back(some.first(half));
     }
@@ -78,10 +78,19 @@ class Splitter {
 
   bool lies_flat(std::span<const std::uint32_t> some, Chart& chart) const {
     set_frame(some, chart);
-    for (const std::uint32_t t : some) {
-      if (dot(area_[t], chart.normal) < kSteepest * length(area_[t])) return false;
-    }
-    return !folds(some, chart);
+    return std::none_of(some.begin(), some.end(), [&](std::uint32_t t) { return is_steep(t, chart); }) &&
+           !folds(some, chart);
+  }
+  bool is_steep(std::uint32_t t, const Chart& chart) const {
+    return dot(area_[t], chart.normal) < kSteepest * length(area_[t]);
+  }
+
+  /// A few steep triangles go aside; else the box is halved. Returns the size of the first part.
+  std::size_t part(std::span<std::uint32_t> some, const Chart& chart) const {
+    const auto steep =
+        std::stable_partition(some.begin(), some.end(), [&](std::uint32_t t) { return !is_steep(t, chart); });
+    const auto flat = static_cast<std::size_t>(steep - some.begin()), rest = some.size() - flat;
+    return rest > 0 && 8 * rest <= some.size() ? flat : halve(some);
   }
 
   Flat flat(std::uint32_t t, const Chart& chart) const {

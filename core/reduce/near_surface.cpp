@@ -31,7 +31,7 @@ struct NearSurface::Cells {
     build();
   }
 
-  std::int64_t cell(double x) const { return static_cast<std::int64_t>(std::floor(x / size)); }
+  std::int64_t cell(double x) const { return floor_of(x / size); }
   static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
     constexpr std::int64_t kOffset = 1 << 20, kMask = (1 << 21) - 1;
     const auto part = [](std::int64_t i) { return static_cast<std::uint64_t>((i + kOffset) & kMask); };
@@ -88,23 +88,23 @@ std::optional<NearMatch> NearSurface::query(const Vec3d& point, const Vec3d& nor
   const Cells& c = *cells_;
   const std::uint64_t key = Cells::key(c.cell(point.x), c.cell(point.y), c.cell(point.z));
   const std::uint32_t at = c.table.find(mix64(key), [&](std::uint32_t i) { return c.keys[i] == key; });
-  const double margin = c.margin * c.margin;
-  NearPlace best, any;
-  best.squared = any.squared = margin;
+  NearPlace best, any;  // the nearest that looks the same way, and the nearest of all
+  double best_distance = c.margin, any_distance = c.margin;
   std::uint32_t face = IndexTable::kNone, any_face = IndexTable::kNone;
   if (at != IndexTable::kNone) {
     for (std::uint32_t i = c.first[at]; i < c.first[at + 1]; ++i) {
       const FlatTriangle& f = c.faces[c.list[i]];
-      const double height = dot(f.normal, point) - f.distance;
       const bool compatible = dot(f.normal, normal) > ClosestPoint::kCompatibleCosine;
-      if (height * height >= (compatible ? best.squared : any.squared)) continue;
+      const double limit = compatible ? best_distance : any_distance;
+      if (std::abs(dot(f.normal, point) - f.distance) >= limit || f.is_beyond(point, limit)) continue;
       const NearPlace place = nearest_place(f, point);
-      if (place.squared < any.squared) any = place, any_face = c.list[i];
-      if (compatible && place.squared < best.squared) best = place, face = c.list[i];
+      if (place.squared >= limit * limit) continue;
+      const double distance = std::sqrt(place.squared);
+      if (distance < any_distance) any = place, any_face = c.list[i], any_distance = distance;
+      if (compatible) best = place, face = c.list[i], best_distance = distance;
     }
   }
-  const double any_distance = std::sqrt(any.squared);
-  if (face != IndexTable::kNone) return NearMatch{{face, best.u, best.v, std::sqrt(best.squared)}, any_distance};
+  if (face != IndexTable::kNone) return NearMatch{{face, best.u, best.v, best_distance}, any_distance};
   if (any_face != IndexTable::kNone) return NearMatch{{any_face, any.u, any.v, any_distance}, any_distance};
   const auto match = c.tree.query(point, Vec3d{});
   return match ? std::optional(NearMatch{*match, match->distance}) : std::nullopt;

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kShards = 8, kBlock = 2048;
 constexpr std::size_t kMostPoints = 1U << 18;  // of a group: what is held of a batch at once
 constexpr std::uint32_t kMostCuts = 512;       // of a triangle's edge
-constexpr std::size_t kProbes = 20'000, kWitnesses = 40'000;
+constexpr std::size_t kProbes = 20'000, kWitnesses = 16'000;
 
 /// Points of the reduced mesh that wait for the nearest triangle of the model.
 class Witnesses {
@@ -84,7 +84,7 @@ class Witnesses {
  private:
   static constexpr std::uint64_t kSpread = 0x9e3779b97f4a7c15ULL;
 
-  std::int64_t cell(double x) const { return static_cast<std::int64_t>(std::floor(x / reach_)); }
+  std::int64_t cell(double x) const { return floor_of(x / reach_); }
   static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
     const auto part = [](std::int64_t i) { return static_cast<std::uint64_t>(i + (1 << 20)) & ((1U << 21) - 1); };
     return part(x) << 42 | part(y) << 21 | part(z);
@@ -93,7 +93,7 @@ class Witnesses {
   void offer(std::uint32_t witness, const FlatTriangle& face) {
     const double height = dot(face.normal, point_[witness]) - face.distance;
     double known = squared_[witness].load(std::memory_order_relaxed);
-    if (height * height >= known) return;
+    if (height * height >= known || face.is_beyond(point_[witness], std::sqrt(known))) return;
     const double squared = nearest_place(face, point_[witness]).squared;
     while (squared < known && !squared_[witness].compare_exchange_weak(known, squared, std::memory_order_relaxed)) {
     }
@@ -154,7 +154,7 @@ class Projector {
       : what_(what),
         threads_(threads),
         near_(what.mesh),
-        witnesses_(what.mesh, 2 * mean_edge(what.mesh), what.seed),
+        witnesses_(what.mesh, mean_edge(what.mesh), what.seed),
         probe_every_(std::max<std::uint64_t>(1, what.triangles / kProbes)) {
     if (what.atlas) {
       const auto side = static_cast<std::size_t>(what.atlas->side);
@@ -298,12 +298,13 @@ class Projector {
 
   void probe(const TriangleBatch& batch, std::size_t t) {
     const Vec3d* p = &unit_[3 * t];
-    const Vec3d flat = normalized(cross(p[1] - p[0], p[2] - p[0]), Vec3d{});
+    const Vec3d twice = cross(p[1] - p[0], p[2] - p[0]), flat = normalized(twice, Vec3d{});
     if (!(length(flat) > 0)) return;
     const auto match = near_.query((p[0] + p[1] + p[2]) / 3.0, flat);
     if (!match) return;
-    out_.probes.push_back({match->place.triangle, static_cast<float>(match->place.u), static_cast<float>(match->place.v),
-                           normal_at(batch, t, 1.0 / 3, 1.0 / 3, flat)});
+    out_.probes.push_back({match->place.triangle, static_cast<float>(match->place.u),
+                           static_cast<float>(match->place.v), normal_at(batch, t, 1.0 / 3, 1.0 / 3, flat),
+                           0.5 * length(twice)});
   }
 
   const Projecting& what_;

@@ -41,6 +41,7 @@ struct NormalProbe {
   std::uint32_t triangle = 0;
   float u = 0, v = 0;
   Vec3f normal;
+  double weight = 0;  // area of the triangle that it is the middle of
 };
 
 struct Projection {

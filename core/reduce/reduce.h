@@ -11,11 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "core/reduce/reduce_method.h"
 #include "core/reduce/surface_maps.h"
 
 namespace kiln {
-
-enum class ReduceMethod { cluster, adaptive };
 
 struct Reduce {
   std::uint64_t triangles = 100'000;  // of the result, at most

@@ -338,7 +338,7 @@ SurfaceMaps make_maps(const Mesh& mesh, const Atlas& atlas, const std::vector<Te
 }
 
 double normal_error(const Mesh& mesh, const SurfaceMaps* maps, const std::vector<NormalProbe>& probes) {
-  double sum = 0;
+  double sum = 0, weight = 0;
   for (const NormalProbe& probe : probes) {
     const ViewFrame frame(mesh, probe.triangle, probe.u, probe.v);
     Vec3d shown = frame.normal;
@@ -350,10 +350,11 @@ double normal_error(const Mesh& mesh, const SurfaceMaps* maps, const std::vector
       shown = normalized(frame.to_unit(map_normal(*maps, uv)));
     }
     const double angle = std::acos(std::clamp(dot(shown, to_double(probe.normal)), -1.0, 1.0));
-    sum += angle * angle;
+    sum += probe.weight * angle * angle;
+    weight += probe.weight;
   }
   constexpr double kDegrees = 57.29577951308232;
-  return probes.empty() ? 0 : kDegrees * std::sqrt(sum / static_cast<double>(probes.size()));
+  return weight > 0 ? kDegrees * std::sqrt(sum / weight) : 0;
 }
 
 }  // namespace kiln

@@ -81,6 +81,7 @@ BakeInput read_input(const WorkerOrder& order) {
   auto recipe = parse_recipe(order.recipe);
   if (!recipe) throw WorkerTrouble{{"internal", "the worker did not understand its recipe", ""}};
   BakeInput input;
+  input.spill_folder = "out";  // the only place that the sandbox lets it write to
   input.recipe = std::move(*recipe);
   std::size_t place = 0;
   input.scene.name = order.inputs.scene.name;
