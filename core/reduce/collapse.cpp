@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffffU;
 constexpr double kTurned = 0.2;     // cosine between a triangle's normals before and after
 constexpr double kNeedle = 0.05;    // 4 sqrt(3) area / sum of squared edges: 1 for an equilateral triangle
-constexpr double kEvenness = 1e-5;  // of squared edge length beside the error: flat regions collapse short edges first
+constexpr double kEvenness = 1e-6;  // of squared edge length beside the error: flat regions collapse short edges first
 
 struct Candidate {
   double cost;
@@ -30,7 +30,7 @@ class Collapser {
     gone_.assign(triangles, false);
     left_ = triangles;
     for (std::uint32_t corner = 0; corner < 3 * triangles; ++corner) append(vertex_of(corner), corner);
-    border_.assign(vertices, false);
+    border_.assign(vertices, false), refused_.assign(vertices, false);
     for (std::uint32_t v = 0; v < vertices; ++v) find_border(v);
   }
 
@@ -46,7 +46,15 @@ class Collapser {
       queue_.pop();
       if (age_[c.a] != c.age_a || age_[c.b] != c.age_b) continue;
       const Vec3d place = best_place(c.a, c.b);
-      if (may_join(c.a, c.b, place)) join(c.a, c.b, place);
+      if (may_join(c.a, c.b, place)) {
+        join(c.a, c.b, place);
+      } else if (is_tetrahedron(c.a) && left_ > 4) {
+        const std::vector<std::uint32_t> others = ring(c.a);
+        for (const std::uint32_t w : others) drop_around(w);
+        ++age_[c.a];
+      } else {
+        refused_[c.a] = refused_[c.b] = true;
+      }
     }
     compact();
   }
@@ -178,6 +186,35 @@ class Collapser {
     ++age_[a], ++age_[b];
     const std::vector<std::uint32_t> neighbours = ring(a);
     for (const std::uint32_t w : neighbours) push(a, w);
+    for (const std::uint32_t w : neighbours) {
+      if (!refused_[w]) continue;
+      refused_[w] = false;
+      for (const std::uint32_t x : ring(w)) {
+        if (x != a) push(w, x);
+      }
+    }
+  }
+
+  /// A closed piece of four triangles: it can only go as a whole.
+  bool is_tetrahedron(std::uint32_t v) {
+    const std::vector<std::uint32_t> others = ring(v);
+    if (others.size() != 3 || triangles_at(v) != 3) return false;
+    return std::all_of(others.begin(), others.end(), [&](std::uint32_t w) {
+      const auto& around_w = ring(w);
+      const auto is_own = [&](std::uint32_t x) {
+        return x == v || std::find(others.begin(), others.end(), x) != others.end();
+      };
+      return triangles_at(w) == 3 && around_w.size() == 3 && std::all_of(around_w.begin(), around_w.end(), is_own);
+    });
+  }
+  std::size_t triangles_at(std::uint32_t v) const {
+    std::size_t n = 0;
+    around(v, [&](std::uint32_t, std::uint32_t, std::uint32_t) { ++n; });
+    return n;
+  }
+  void drop_around(std::uint32_t v) {
+    around(v, [&](std::uint32_t t, std::uint32_t, std::uint32_t) { gone_[t] = true, --left_; });
+    ++age_[v];
   }
 
   /// Two triangles around v with the same corners: one stays where they look the same way, none where they look against
@@ -220,6 +257,7 @@ class Collapser {
   std::vector<std::uint32_t> head_, tail_, next_, age_, mark_, ring_, common_;
   std::uint32_t stamp_ = 0;
   std::vector<bool> gone_, border_;
+  std::vector<bool> refused_;  // an edge of it may be taken once what is around has changed
   std::priority_queue<Candidate> queue_;
 };
 

@@ -9,7 +9,7 @@
 // Paper    [GarlandHeckbert97]; [GarlandShaffer02]: quadrics of the clusters go on counting after clustering
 // Cost     O(n log n), about 2 us a collapse
 // Repeat   same bits always: one thread, ties by vertex number
-// Differs  vertices of closed pieces of four triangles stay in the first round; non-manifold edges take part
+// Differs  a closed piece of four triangles goes as a whole; non-manifold edges take part
 
 #include "core/base/threads.h"
 #include "core/reduce/surface.h"

@@ -51,6 +51,6 @@ struct Quadric {
 
 /// Where Q is least, drawn towards `anchor` as far as Q does not care: the least of Q(p) + eps trace(A) |p - anchor|^2.
 /// `anchor` itself where A is zero.
-Vec3d least_point(const Quadric&, const Vec3d& anchor, double eps = 1e-3);
+Vec3d least_point(const Quadric&, const Vec3d& anchor, double eps = 1e-5);
 
 }  // namespace kiln

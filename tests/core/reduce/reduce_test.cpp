@@ -36,11 +36,11 @@ TEST(Reduce, KnowsHowFarASphereIsFromItsReduction) {
 }
 
 TEST(Reduce, OfACubeHasNoErrorEitherWay) {
-  const auto out = reduced(testing::cube(30), {.triangles = 12, .map_side = 128});
+  const auto out = reduced(testing::cube(30), {.triangles = 40, .map_side = 128});
   ASSERT_TRUE(out);
-  EXPECT_EQ(out->mesh.triangles.size(), 12U);
-  EXPECT_LT(out->error.rms, 3e-4);  // corners are drawn off by eps of least_point
-  EXPECT_LT(out->error.rms_back, 3e-4);
+  EXPECT_LE(out->mesh.triangles.size(), 40U);
+  EXPECT_LT(out->error.rms, 1e-6);
+  EXPECT_LT(out->error.rms_back, 1e-6);
   EXPECT_LT(out->normal_degrees, 1);
 }
 
@@ -135,7 +135,7 @@ TEST(Reduce, LeavesAModelAloneThatIsSmallEnough) {
   ASSERT_TRUE(out);
   EXPECT_EQ(out->mesh.triangles.size(), 48U);
   EXPECT_EQ(out->maps.side, 0);
-  EXPECT_EQ(out->error.rms, 0);
+  EXPECT_LT(out->error.rms, 1e-7);  // float positions
 }
 
 TEST(Reduce, KeepsTheBodyOfAScanWithSpecks) {
