@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <queue>
 #include <span>
 #include <unordered_map>
 
@@ -41,8 +42,11 @@ class Splitter {
     }
   }
 
-  /// Leaves in the order of the tree.
-  std::vector<Chart> run() {
+  /// Leaves in the order of the tree, those that lie flat together joined.
+  std::vector<Chart> run() { return join(leaves()); }
+
+ private:
+  std::vector<Chart> leaves() const {
     std::vector<std::uint32_t> all(triangles_.size());
     std::iota(all.begin(), all.end(), 0U);
     std::vector<Chart> charts;
@@ -67,7 +71,86 @@ class Splitter {
     return charts;
   }
 
- private:
+  struct Seam {
+    double length;
+    std::uint32_t a, b;                    // charts, a < b
+    bool operator<(const Seam& o) const {  // the longest first
+      if (length != o.length) return length < o.length;
+      return a != o.a ? a > o.a : b > o.b;
+    }
+  };
+  using Seams = std::unordered_map<std::uint32_t, double>;  // length by neighbour
+
+  /// Neighbours along each chart's border.
+  std::vector<Seams> seams_of(const std::vector<Chart>& charts) const {
+    std::vector<Seams> out(charts.size());
+    std::unordered_map<std::uint64_t, std::uint32_t> open;  // chart of an edge seen once
+    for (std::uint32_t c = 0; c < charts.size(); ++c) {
+      for (const std::uint32_t t : charts[c].triangles) {
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto [low, high] = std::minmax(triangles_[t][i], triangles_[t][(i + 1) % 3]);
+          const auto [at, fresh] = open.emplace(std::uint64_t{low} << 32 | high, c);
+          if (fresh || at->second == c) continue;
+          const double length = kiln::length(position_[high] - position_[low]);
+          out[c][at->second] += length, out[at->second][c] += length;
+        }
+      }
+    }
+    return out;
+  }
+
+  /// Joins neighbours, those with the longest common border first, as long as the two together lie flat and their
+  /// rectangle is not much larger than both of theirs.
+  std::vector<Chart> join(std::vector<Chart> charts) const {
+    std::vector<Seams> seams = seams_of(charts);
+    std::priority_queue<Seam> queue;
+    const auto push = [&](std::uint32_t a, std::uint32_t b) {
+      queue.push({seams[a][b], std::min(a, b), std::max(a, b)});
+    };
+    for (std::uint32_t a = 0; a < charts.size(); ++a) {
+      for (const auto& [b, length] : seams[a]) {
+        if (a < b) push(a, b);
+      }
+    }
+    while (!queue.empty()) {
+      const auto [length, a, b] = queue.top();
+      queue.pop();
+      if (charts[a].triangles.empty() || charts[b].triangles.empty()) continue;
+      Chart both;
+      if (!lie_flat_together(charts[a], charts[b], both)) continue;
+      const auto fresh = static_cast<std::uint32_t>(charts.size());
+      charts.push_back(std::move(both));
+      seams.emplace_back();
+      for (const std::uint32_t old : {a, b}) {
+        charts[old] = {};
+        for (const auto& [other, common] : seams[old]) {
+          if (other == a || other == b || charts[other].triangles.empty()) continue;
+          seams[fresh][other] += common, seams[other][fresh] += common;
+        }
+        seams[old].clear();
+      }
+      for (const auto& [other, common] : seams[fresh]) push(fresh, other);
+    }
+    std::erase_if(charts, [](const Chart& c) { return c.triangles.empty(); });
+    return charts;
+  }
+
+  bool lie_flat_together(const Chart& a, const Chart& b, Chart& both) const {
+    constexpr double kLarger = 1.2;        // than both rectangles
+    constexpr std::size_t kMost = 20'000;  // triangles: what is tried again and again stays small
+    if (dot(a.normal, b.normal) < kSteepest || a.triangles.size() + b.triangles.size() > kMost) return false;
+    both.triangles = a.triangles;
+    both.triangles.insert(both.triangles.end(), b.triangles.begin(), b.triangles.end());
+    set_frame(both.triangles, both);
+    if (std::any_of(both.triangles.begin(), both.triangles.end(), [&](std::uint32_t t) { return is_steep(t, both); }))
+      return false;
+    shrink(both);
+    const auto area = [](const Chart& c) { return (c.high.x - c.low.x) * (c.high.y - c.low.y); };
+    if (area(both) > kLarger * (area(a) + area(b)) || folds(both.triangles, both)) return false;
+    std::sort(both.triangles.begin(), both.triangles.end());
+    return true;
+  }
+
   void set_frame(std::span<const std::uint32_t> some, Chart& chart) const {
     Vec3d sum;
     for (const std::uint32_t t : some) sum += area_[t];

@@ -3,7 +3,8 @@
 //
 // A box of triangles is split at the median of its longest side until, seen along the mean normal of its triangles,
 // none is steeper than kSteepest and no two overlap. What is left is projected onto its plane and turned so that its
-// rectangle is small; rectangles are put on shelves by height, at the largest scale that fits.
+// rectangle is small; neighbours that lie flat together are joined again; rectangles are put on shelves by height, at
+// the largest scale that fits.
 //
 // Paper    [Pacanowski06] section 2, step 3: leaves with quadrilateral textures, split until nothing folds over
 // Units    charts in texels; v runs downwards, so that across(normal, tangent) points up in the image
@@ -37,8 +38,9 @@ struct Atlas {
   std::vector<std::uint32_t> chart_of;  // of each triangle
 };
 
-/// cos of the steepest triangle against its chart's normal: lengths shrink to no less in the texture.
-inline constexpr double kSteepest = 0.5;
+/// Cosine of the steepest triangle against its chart: 44 degrees, so that no chart bends around a right angle, and
+/// lengths in the texture are no less than this share of those on the surface.
+inline constexpr double kSteepest = 0.72;
 
 Atlas make_atlas(const std::vector<Vec3d>& position, const std::vector<Triangle>&, int side);
 
