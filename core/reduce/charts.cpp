@@ -137,7 +137,7 @@ class Splitter {
 
   bool lie_flat_together(const Chart& a, const Chart& b, Chart& both) const {
     constexpr double kLarger = 1.2;        // than both rectangles
-    constexpr std::size_t kMost = 20'000;  // triangles: what is tried again and again stays small
+    constexpr std::size_t kMost = 300;  // triangles: what is tried again and again stays small
     if (dot(a.normal, b.normal) < kSteepest || a.triangles.size() + b.triangles.size() > kMost) return false;
     both.triangles = a.triangles;
     both.triangles.insert(both.triangles.end(), b.triangles.begin(), b.triangles.end());
