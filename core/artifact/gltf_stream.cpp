@@ -111,14 +111,17 @@ class PrimitiveReader {
     normal_->floats(v, n);
     return {n[0], n[1], n[2]};
   }
-  /// Linear base colour, as the material has it.
-  Vec3f color(std::uint32_t v, const Scene& look) const {
-    const Material& m = look.materials[static_cast<std::size_t>(primitive_.material)];
-    const Vec2f uv = uv_at(v, m.base_color_texture.uv_set);
-    const Vec4f texel = sample_texture(look, m.base_color_texture, uv, true), own = own_color(v);
-    const auto unit = [](float x) { return std::clamp(x, 0.0F, 1.0F); };
-    return {unit(m.base_color.x * texel.x * own.x), unit(m.base_color.y * texel.y * own.y),
-            unit(m.base_color.z * texel.z * own.z)};
+  const Material& material(const Scene& look) const {
+    return look.materials[static_cast<std::size_t>(primitive_.material)];
+  }
+  /// Of the set that the base colour's texture uses.
+  Vec2f uv(std::uint32_t v, const Scene& look) const { return uv_at(v, material(look).base_color_texture.uv_set); }
+  Vec3f own_color(std::uint32_t v) const {
+    if (!color_)
+      return part_.color.empty() ? Vec3f{1, 1, 1} : Vec3f{part_.color[v].x, part_.color[v].y, part_.color[v].z};
+    float c[4];
+    color_->floats(v, c);
+    return {c[0], c[1], c[2]};
   }
   Fault bad_number(std::uint32_t v, bool finite) const {
     return {finite ? "position_out_of_range" : "non_finite_geometry",
@@ -140,12 +143,6 @@ class PrimitiveReader {
     reader->floats(v, uv);
     return std::isfinite(uv[0]) && std::isfinite(uv[1]) ? Vec2f{uv[0], uv[1]} : Vec2f{};
   }
-  Vec4f own_color(std::uint32_t v) const {
-    if (!color_) return part_.color.empty() ? Vec4f{1, 1, 1, 1} : part_.color[v];
-    float c[4];
-    color_->floats(v, c);
-    return {c[0], c[1], c[2], 1};
-  }
 
   const Primitive& primitive_;
   std::string place_;
@@ -156,11 +153,27 @@ class PrimitiveReader {
   RawPart part_;
 };
 
+/// Linear base colour: factor x texture x vertex colour.
+Vec3f base_color(const Scene& look, const Material& m, const Vec2f& uv, const Vec3f& own) {
+  const Vec4f texel = sample_texture(look, m.base_color_texture, uv, true);
+  const auto unit = [](float x) { return std::clamp(x, 0.0F, 1.0F); };
+  return {unit(m.base_color.x * texel.x * own.x), unit(m.base_color.y * texel.y * own.y),
+          unit(m.base_color.z * texel.z * own.z)};
+}
+
 /// One pass over everything that is placed.
 class Pass {
  public:
   Pass(const GltfFile& file, bool normals, bool colors, const TriangleSource::Take& take, Threads& threads)
-      : file_(file), normals_(normals), colors_(colors), take_(take), threads_(threads) {}
+      : file_(file), normals_(normals), colors_(colors), take_(take), threads_(threads) {
+    if (colors_ && textured(file))
+      batch_.texture = [this](std::size_t t, double u, double v) { return color(t, u, v); };
+  }
+
+  static bool textured(const GltfFile& file) {
+    return std::any_of(file.look.materials.begin(), file.look.materials.end(),
+                       [](const Material& m) { return m.base_color_texture.texture >= 0; });
+  }
 
   Result<void> run() {
     for (const Placement& placement : file_.placements) {
@@ -202,7 +215,8 @@ class Pass {
     const Affine turn = cofactors(world);
     batch_.position.resize(after);
     if (normals_) batch_.normal.resize(after);
-    if (colors_) batch_.color.resize(after);
+    if (colors_) batch_.color.resize(after), uv_.resize(after), own_.resize(after);
+    if (colors_) material_.resize(after / 3, &reader.material(file_.look));
     const auto bad = fetch_corners(corners_, threads_, [&](std::uint32_t v, std::size_t i) {
       const std::size_t c = i % 3, at = before + i - c + (mirrored && c > 0 ? 3 - c : c);
       const Vec3d local = reader.position(v);
@@ -211,7 +225,10 @@ class Pass {
         const Vec3d n = turn.vector(to_double(reader.normal(v)));
         batch_.normal[at] = normalized(to_float(normalized(mirrored ? -n : n, Vec3d{})), Vec3f{});
       }
-      if (colors_) batch_.color[at] = reader.color(v, file_.look);
+      if (colors_) {
+        uv_[at] = reader.uv(v, file_.look), own_[at] = reader.own_color(v);
+        batch_.color[at] = base_color(file_.look, reader.material(file_.look), uv_[at], own_[at]);
+      }
       return is_sane_position(batch_.position[at]) && (!colors_ || is_finite(batch_.color[at]));
     });
     if (!bad) return {};
@@ -224,7 +241,15 @@ class Pass {
     take_(batch_);
     batch_.first += batch_.triangles();
     batch_.position.clear(), batch_.normal.clear(), batch_.color.clear();
+    uv_.clear(), own_.clear(), material_.clear();
     return {};
+  }
+
+  Vec3f color(std::size_t t, double u, double v) const {
+    const auto a = static_cast<float>(1 - u - v), b = static_cast<float>(u), c = static_cast<float>(v);
+    const Vec2f* at = &uv_[3 * t];
+    const Vec2f uv{a * at[0].x + b * at[1].x + c * at[2].x, a * at[0].y + b * at[1].y + c * at[2].y};
+    return base_color(file_.look, *material_[t], uv, own_[3 * t] * a + own_[3 * t + 1] * b + own_[3 * t + 2] * c);
   }
 
   const GltfFile& file_;
@@ -233,6 +258,9 @@ class Pass {
   Threads& threads_;
   TriangleBatch batch_;
   CornerBatch corners_;
+  std::vector<Vec2f> uv_;                  // of each corner of the batch
+  std::vector<Vec3f> own_;                 // vertex colour
+  std::vector<const Material*> material_;  // of each triangle
 };
 
 /// Only base colours are carried along: their images are decoded, others are named.
@@ -316,7 +344,10 @@ TriangleSource open_gltf_triangles(const SceneFiles& files, const StreamOptions&
   if (!load(*file, limits, findings)) return source;
   count(*file, source);
   for (const Bytes& held : file->bytes.owned) source.memory_bytes += held.size();
-  for (const Image& image : file->look.images) source.memory_bytes += image.rgba.size();
+  for (const Image& image : file->look.images) {
+    source.memory_bytes += image.rgba.size();
+    source.texels = std::max<std::uint64_t>(source.texels, image.rgba.size() / 4);
+  }
   if (source.memory_bytes > options.max_memory_bytes / 2) {
     findings.fail("memory_limit", "Decoded buffers and images would take more than half of limits.memory_mb.");
   }

@@ -136,7 +136,7 @@ class Splitter {
   }
 
   bool lie_flat_together(const Chart& a, const Chart& b, Chart& both) const {
-    constexpr double kLarger = 1.2;        // than both rectangles
+    constexpr double kLarger = 1.2;     // than both rectangles
     constexpr std::size_t kMost = 300;  // triangles: what is tried again and again stays small
     if (dot(a.normal, b.normal) < kSteepest || a.triangles.size() + b.triangles.size() > kMost) return false;
     both.triangles = a.triangles;

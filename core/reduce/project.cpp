@@ -280,11 +280,13 @@ class Projector {
     out.shard = static_cast<std::uint8_t>(out.texel / 64 % kShards);
     out.value.weight = weight;
     out.value.normal = normal_at(batch, t, u, v, flat) * weight;
-    if (!batch.color.empty()) {
-      const Vec3f* c = &batch.color[3 * t];
-      out.value.color =
-          (c[0] * static_cast<float>(1 - u - v) + c[1] * static_cast<float>(u) + c[2] * static_cast<float>(v)) * weight;
-    }
+    if (!batch.color.empty()) out.value.color = color_at(batch, t, u, v) * weight;
+  }
+
+  static Vec3f color_at(const TriangleBatch& batch, std::size_t t, double u, double v) {
+    if (batch.texture) return batch.texture(t, u, v);
+    const Vec3f* c = &batch.color[3 * t];
+    return c[0] * static_cast<float>(1 - u - v) + c[1] * static_cast<float>(u) + c[2] * static_cast<float>(v);
   }
 
   std::uint32_t texel_at(const SurfaceMatch& match) const {

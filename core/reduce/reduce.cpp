@@ -57,11 +57,11 @@ int power_of_two(double side) {
   return out;
 }
 
-/// Two texels for a triangle of the model in the 60 % of an atlas that charts cover.
+/// Two texels for a triangle of the model, and those of its texture, in the 60 % of an atlas that charts cover.
 int map_side(const TriangleSource& source, const Reduce& params, std::uint64_t usable) {
   if (params.map_side >= 0) return params.map_side;
   const auto most = static_cast<double>(usable) / kTexelBytes;
-  const double wanted = 2 / 0.6 * static_cast<double>(source.triangles);
+  const double wanted = std::max(2 / 0.6 * static_cast<double>(source.triangles), static_cast<double>(source.texels));
   int side = power_of_two(std::sqrt(wanted));
   side = std::max(side, power_of_two(std::sqrt(20.0 * static_cast<double>(params.triangles))));
   side = std::min(side, 4096);

@@ -18,6 +18,9 @@ struct TriangleBatch {
   std::vector<Vec3d> position;  // world
   std::vector<Vec3f> normal;    // unit, or zero where the file has none that is sound; empty where it has none at all
   std::vector<Vec3f> color;     // linear base colour; empty where everything is white
+  /// Colour at corner 0 + u (corner 1 - corner 0) + v (corner 2 - corner 0) of a triangle, where colours are not linear
+  /// in between: textures. Safe on any number of threads. Nothing: interpolate.
+  std::function<Vec3f(std::size_t triangle, double u, double v)> texture;
   std::size_t triangles() const { return position.size() / 3; }
 };
 
@@ -35,6 +38,7 @@ struct TriangleSource {
   std::uint64_t triangles = 0;  // as its header tells; polygons of more corners give more
   std::uint64_t vertices = 0;
   std::uint64_t memory_bytes = 0;  // held while it is open: decoded views and images
+  std::uint64_t texels = 0;        // of the largest base colour texture
   bool normals = false, colors = false;
 
   /// One pass. Every number is checked: finite, and at most 1e18 in size. Fails with the code and the byte of what is

@@ -259,6 +259,32 @@ TEST(GlbStream, MultipliesColoursOfMaterialAndVertices) {
   EXPECT_EQ(got.color, (std::vector<Vec3f>{{0.5F, 0.25F, 1}, {0.25F, 0.25F, 1}, {0, 0.25F, 1}}));
 }
 
+TEST(GlbStream, SamplesTexturesBetweenTheCorners) {
+  test::Sample s;
+  s.positions(test::kTriangle);
+  s.accessor(std::vector<float>{0.25F, 0.25F, 0.75F, 0.25F, 0.25F, 0.75F}, 5126, "VEC2", 3);
+  const Bytes file =
+      s.glb(test::one_node(R"("attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0)") +
+            R"(,"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"textures":[{"source":0}],)"
+            R"("images":[{"uri":"data:image/png;base64,)" +
+            test::base64(test::tiny_png()) + R"("}])");
+  const TriangleSource source = open_glb(file);
+  EXPECT_EQ(source.texels, 4U);
+  Threads threads(1);
+  const auto done = source.stream(
+      Detail::all,
+      [](const TriangleBatch& b) {
+        EXPECT_EQ(b.color, (std::vector<Vec3f>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}));  // texel centres
+        ASSERT_TRUE(b.texture);
+        const Vec3f middle = b.texture(0, 0.5, 0);
+        EXPECT_NEAR(middle.x, 0.5, 1e-6);
+        EXPECT_NEAR(middle.y, 0.5, 1e-6);
+        EXPECT_EQ(b.texture(0, 0, 1), (Vec3f{0, 0, 1}));
+      },
+      threads);
+  EXPECT_TRUE(done);
+}
+
 TEST(GlbStream, RefusesAccessorsThatOverflowAndIndicesThatPointOutside) {
   test::Sample s;
   s.positions(test::kTriangle);
