@@ -87,14 +87,15 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 }
 
 /// From outside, so that it holds for every program that may be the worker.
-void limit(pid_t pid, std::uint64_t memory_bytes) {
+void limit(pid_t pid, const WorkerStart& start) {
   const rlimit no_core{0, 0};
   const rlimit files{kMaxFiles, kMaxFiles};
   ::prlimit(pid, RLIMIT_CORE, &no_core, nullptr);
   ::prlimit(pid, RLIMIT_NOFILE, &files, nullptr);
-  if (!kLimitAddressSpace || memory_bytes == 0) return;
+  if (!kLimitAddressSpace || start.memory_bytes == 0) return;
   // Allocators and thread stacks reserve more than they use; resident memory is watched by the supervisor.
-  const rlim_t space = 2 * memory_bytes + (4ULL << 30);
+  // A scene is mapped, and what a reduction puts aside of it may be as large again.
+  const rlim_t space = 2 * start.memory_bytes + 2 * start.mapped_bytes + (4ULL << 30);
   const rlimit address_space{space, space};
   ::prlimit(pid, RLIMIT_AS, &address_space, nullptr);
 }
@@ -122,7 +123,7 @@ Result<WorkerProcess> WorkerProcess::start(const WorkerStart& start) {
     ::close(ends[0]);
     return spawn_fault();
   }
-  limit(pid, start.memory_bytes);
+  limit(pid, start);
   WorkerProcess worker(pid, ends[0], static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
   if (worker.end_ < 0) return spawn_fault();  // the destructor ends it
   ::fcntl(worker.end_, F_SETFD, FD_CLOEXEC);
