@@ -1,7 +1,7 @@
 #include "core/reduce/collapse.h"
 
 #include <algorithm>
-#include <queue>
+#include <vector>
 
 namespace kiln {
 namespace {
@@ -12,13 +12,45 @@ constexpr double kNeedle = 0.05;    // 4 sqrt(3) area / sum of squared edges: 1 
 constexpr double kEvenness = 1e-6;  // of squared edge length beside the error: flat regions collapse short edges first
 
 struct Candidate {
-  double cost;
-  std::uint32_t a, b;          // a < b
-  std::uint32_t age_a, age_b;  // of the vertices when the cost was found
+  float cost;
+  std::uint32_t a, b;  // a < b
+  std::uint32_t age;   // of both vertices together when the cost was found: ages only grow
   bool operator<(const Candidate& o) const {
-    if (cost != o.cost) return cost > o.cost;
-    return a != o.a ? a > o.a : b > o.b;
+    if (cost != o.cost) return cost < o.cost;
+    return a != o.a ? a < o.a : b < o.b;
   }
+};
+
+/// The least first. Four children share a cache line, which is where a large queue spends its time.
+class Queue {
+ public:
+  bool empty() const { return items_.empty(); }
+  void push(const Candidate& c) {
+    std::size_t at = items_.size();
+    items_.push_back(c);
+    for (; at > 0 && c < items_[(at - 1) / 4]; at = (at - 1) / 4) items_[at] = items_[(at - 1) / 4];
+    items_[at] = c;
+  }
+  Candidate pop() {
+    const Candidate least = items_.front(), last = items_.back();
+    items_.pop_back();
+    if (items_.empty()) return least;
+    std::size_t at = 0;
+    for (std::size_t child = 1; child < items_.size(); child = 4 * at + 1) {
+      const std::size_t end = std::min(child + 4, items_.size());
+      for (std::size_t other = child + 1; other < end; ++other) {
+        if (items_[other] < items_[child]) child = other;
+      }
+      if (!(items_[child] < last)) break;
+      items_[at] = items_[child];
+      at = child;
+    }
+    items_[at] = last;
+    return least;
+  }
+
+ private:
+  std::vector<Candidate> items_;
 };
 
 class Collapser {
@@ -42,9 +74,8 @@ class Collapser {
     }
     for (std::size_t step = 0; left_ > target && !queue_.empty(); ++step) {
       if (step % 4096 == 0) threads.check();
-      const Candidate c = queue_.top();
-      queue_.pop();
-      if (age_[c.a] != c.age_a || age_[c.b] != c.age_b) continue;
+      const Candidate c = queue_.pop();
+      if (age_[c.a] + age_[c.b] != c.age) continue;
       const Vec3d place = best_place(c.a, c.b);
       if (may_join(c.a, c.b, place)) {
         join(c.a, c.b, place);
@@ -117,7 +148,7 @@ class Collapser {
     const Quadric q = s_.sample[a].quadric + s_.sample[b].quadric;
     const Vec3d edge = s_.position[b] - s_.position[a];
     const double even = kEvenness * (s_.sample[a].weight + s_.sample[b].weight) * dot(edge, edge);
-    queue_.push({q.at(best_place(a, b)) + even, a, b, age_[a], age_[b]});
+    queue_.push({static_cast<float>(q.at(best_place(a, b)) + even), a, b, age_[a] + age_[b]});
   }
 
   /// Whether a triangle around v (but not w) would turn over or become a needle with v at `place`.
@@ -258,7 +289,7 @@ class Collapser {
   std::uint32_t stamp_ = 0;
   std::vector<bool> gone_, border_;
   std::vector<bool> refused_;  // an edge of it may be taken once what is around has changed
-  std::priority_queue<Candidate> queue_;
+  Queue queue_;
 };
 
 }  // namespace

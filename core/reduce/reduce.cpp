@@ -116,7 +116,7 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
   const auto in = static_cast<double>(source.triangles), out = static_cast<double>(params.triangles);
   const double collapsed = plan.in_core ? in - out : kMoreThanAsked * out;
   plan.seconds =
-      (plan.in_core ? 1.2e-6 : 1.5e-6) * in + 4e-6 * collapsed + 2e-5 * out + 4e-7 * static_cast<double>(texels);
+      (plan.in_core ? 1.5e-6 : 0.7e-6) * in + 3e-6 * collapsed + 2e-5 * out + 4e-7 * static_cast<double>(texels);
   if (2 * plan.vertices < params.triangles && !plan.in_core)
     return too_little(taken + params.triangles / 2 * kLeafBytes, params);
   if (plan.memory_bytes > params.memory_bytes) return too_little(plan.memory_bytes, params);
