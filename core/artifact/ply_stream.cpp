@@ -255,7 +255,7 @@ Result<VertexRows> spill_rows(Cursor& cursor, const PlyElement& e, const StreamO
   KILN_TRY(spill, SpillFile::create(options.spill_folder));
   std::vector<double> values, rows;
   const auto flush = [&] {
-    const auto put = spill.append({reinterpret_cast<const std::uint8_t*>(rows.data()), rows.size() * sizeof(double)});
+    auto put = spill.append({reinterpret_cast<const std::uint8_t*>(rows.data()), rows.size() * sizeof(double)});
     rows.clear();
     return put;
   };

@@ -63,7 +63,7 @@ void decide(Prepared& p, const ReduceStep& step) {
              ", then edges are collapsed"});
   }
   p.decisions.push_back({"normal map", p.plan.map_side > 0 ? std::to_string(p.plan.map_side) : "off",
-                         step.normal_map ? asked : "two texels a triangle of the model, as the memory allows"});
+                         step.normal_map ? asked : "eight texels a triangle of the model, as the memory allows"});
 }
 
 Result<Prepared> prepare(const BakeInput& input) {

@@ -18,6 +18,7 @@ constexpr std::uint64_t kLeafBytes = 560;          // a clustered vertex and its
 constexpr std::uint64_t kTexelBytes = 44;          // sums, both textures, their files on the way out
 constexpr std::uint64_t kResultBytes = 400;        // a triangle of the result: mesh, charts, candidate lists
 constexpr double kMoreThanAsked = 4;               // vertices that the collapse gets, per vertex of the result
+constexpr double kTexelsATriangle = 8;             // of the model, where memory allows
 
 /// The model as the steps see it: tells what passes by, and how much memory is in use.
 class Watched {
@@ -57,11 +58,12 @@ int power_of_two(double side) {
   return out;
 }
 
-/// Two texels for a triangle of the model, and those of its texture, in the 60 % of an atlas that charts cover.
+/// Eight texels for a triangle of the model, or those of its texture. Measured: core/reduce/README.md.
 int map_side(const TriangleSource& source, const Reduce& params, std::uint64_t usable) {
   if (params.map_side >= 0) return params.map_side;
   const auto most = static_cast<double>(usable) / kTexelBytes;
-  const double wanted = std::max(2 / 0.6 * static_cast<double>(source.triangles), static_cast<double>(source.texels));
+  const double wanted =
+      std::max(kTexelsATriangle * static_cast<double>(source.triangles), static_cast<double>(source.texels));
   int side = power_of_two(std::sqrt(wanted));
   side = std::max(side, power_of_two(std::sqrt(20.0 * static_cast<double>(params.triangles))));
   side = std::min(side, 4096);
