@@ -14,8 +14,7 @@
 // Radiosity (order 0) is one light only: the transport error is that of the job's light in full detail.
 // Seen      Points inside solids count (the artefact has light to tell there, and truth is black), but nobody sees them
 //           (core/prt/hidden.h): the transport error of the others is given besides.
-// Spending  A pilot tells the error and the reference's noise. Paths are as many as keep that noise below the error;
-//           what they leave of the budget goes into more points, since the interval hangs on a few bad ones.
+// Spending  spending.h: many points with few paths each, since the interval hangs on a few bad points.
 // Never changes the artefact.   Repeat  same numbers for any thread count.
 
 #include <cstdint>

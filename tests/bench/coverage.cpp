@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,37 +54,39 @@ void print(const std::string& what, const std::vector<ErrorStats>& all, const st
                           .c_str());
 }
 
-template <class T>
-T need(Outcome<T> outcome, const std::string& what) {
-  if (outcome) return std::move(*outcome);
-  std::fprintf(stderr, "%s: %s\n", what.c_str(), outcome.error().problem.detail.c_str());
-  std::exit(1);
-}
-
-int run(const std::vector<std::string>& words) {
-  std::vector<std::string> paths;
+struct Asked {
+  std::string model, artefact;
   LightOptions light;
   std::uint64_t seeds = 100;
+};
+
+std::optional<Asked> parse(const std::vector<std::string>& words) {
+  Asked out;
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i] == "--env" && i + 1 < words.size()) {
-      light.name = words[++i];
+      out.light.name = words[++i];
     } else if (words[i] == "--seeds" && i + 1 < words.size()) {
-      seeds = std::stoull(words[++i]);
+      out.seeds = std::stoull(words[++i]);
+    } else if (out.model.empty() || out.artefact.empty()) {
+      (out.model.empty() ? out.model : out.artefact) = words[i];
     } else {
-      paths.push_back(words[i]);
+      return std::nullopt;
     }
   }
-  if (paths.size() != 2) return 1;
+  return out.artefact.empty() ? std::nullopt : std::optional(out);
+}
+
+Outcome<void> measure(const Asked& asked) {
   Threads threads;
-  const Scene scene = need(load_scene(paths[0]), paths[0]);
-  const BakedScene baked = need(load_artefact(paths[1]), paths[1]);
-  const auto environment = need(load_light(light), light.name);
-  const auto report = std::filesystem::path(paths[1]).replace_filename("report.json").string();
-  const auto rays = json::parse(need(read_text(report), report)).at("rays").get<std::uint64_t>();
+  KILN_TRY(scene, load_scene(asked.model));
+  KILN_TRY(baked, load_artefact(asked.artefact));
+  KILN_TRY(environment, load_light(asked.light));
+  KILN_TRY(report, read_text(std::filesystem::path(asked.artefact).replace_filename("report.json").string()));
+  const auto rays = json::parse(report).at("rays").get<std::uint64_t>();
   const Tracer truth(scene, threads);
   std::vector<ErrorStats> transport, job_light;
   std::vector<double> seconds;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= asked.seeds; ++seed) {
     const Certificate c = certify(baked, truth, environment, {.bake_rays = rays, .seed = seed}, threads);
     transport.push_back(c.transport);
     if (c.job_light) job_light.push_back(*c.job_light);
@@ -91,6 +94,19 @@ int run(const std::vector<std::string>& words) {
   }
   print("transport", transport, seconds);
   print("job light", job_light, seconds);
+  return {};
+}
+
+int run(const std::vector<std::string>& words) {
+  const auto asked = parse(words);
+  if (!asked) {
+    std::fprintf(stderr, "kiln_coverage MODEL.glb OUT/scene.glb [--env NAME] [--seeds 100]\n");
+    return 1;
+  }
+  if (const auto done = measure(*asked); !done) {
+    std::fprintf(stderr, "%s\n", done.error().problem.detail.c_str());
+    return 1;
+  }
   return 0;
 }
 

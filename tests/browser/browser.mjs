@@ -1,5 +1,6 @@
 // Chromium for the tests: found, started, watched. Playwright comes from web_viewer/node_modules.
 
+import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { kDist } from './mock_server.mjs';
@@ -76,3 +77,16 @@ export async function until(page, predicate, argument, milliseconds = 20000) {
 }
 
 export const ready = (page) => until(page, () => document.documentElement.dataset.ready === 'true');
+
+/// Opens a viewer page, waits until it shows its light, acts, and expects no fault and no violation of its policy.
+export async function withReady(browser, url, act, options) {
+  const page = await openPage(browser, url, options);
+  try {
+    await ready(page);
+    await act(page);
+    assert.deepEqual(page.faults, []);
+    assert.deepEqual(await page.evaluate(() => window.violations), []);
+  } finally {
+    await page.context().close();
+  }
+}

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
-import { openPage, ready, startBrowser, until } from './browser.mjs';
+import { startBrowser, until, withReady } from './browser.mjs';
 import { jobId, startMock } from './mock_server.mjs';
 import { load } from './sources.mjs';
 
@@ -22,17 +22,7 @@ after(async () => {
   await mock.close();
 });
 
-async function withViewer(hash, act) {
-  const page = await openPage(browser, `${mock.url}${kView}#${hash}`);
-  try {
-    await ready(page);
-    await act(page);
-    assert.deepEqual(page.faults, []);
-    assert.deepEqual(await page.evaluate(() => window.violations), []);
-  } finally {
-    await page.context().close();
-  }
-}
+const withViewer = (hash, act) => withReady(browser, `${mock.url}${kView}#${hash}`, act);
 
 test('the file is read as it was written', () => {
   assert.deepEqual(grid.size, [6, 5, 4]);

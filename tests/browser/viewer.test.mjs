@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
-import { openPage, ready, startBrowser, until } from './browser.mjs';
+import { openPage, ready, startBrowser, until, withReady } from './browser.mjs';
 import { jobId, startMock } from './mock_server.mjs';
 import { decodeBaked, valueAt } from './read_glb.mjs';
 import { load } from './sources.mjs';
@@ -23,17 +23,8 @@ after(async () => {
   await mock.close();
 });
 
-async function withViewer(hash, act, options) {
-  const page = await openPage(browser, `${mock.url}${kView}${hash ? `#${hash}` : ''}`, options);
-  try {
-    await ready(page);
-    await act(page);
-    assert.deepEqual(page.faults, []);
-    assert.deepEqual(await page.evaluate(() => window.violations), []);
-  } finally {
-    await page.context().close();
-  }
-}
+const withViewer = (hash, act, options) =>
+  withReady(browser, `${mock.url}${kView}${hash ? `#${hash}` : ''}`, act, options);
 
 /// The untextured part, and its vertex that faces the camera most squarely.
 const kPart = baked.parts.findIndex(

@@ -9,34 +9,49 @@
 import { Color, type Material, Matrix3, type MeshBasicMaterial, ShaderMaterial, type Texture } from 'three';
 import { lobeFunctions, lobeTexels, mirrorFunctions } from './mirror';
 
-const vertexShader = /* glsl */ `
-attribute vec3 light;
+// What goes from one shader to the other. Light is taken inside the triangle: thin ones extrapolate it to any darkness.
+const varyings = /* glsl */ `
 centroid varying vec3 vLight;
 #ifdef VERTEX_ALBEDO
-attribute vec4 _albedo;
 varying vec4 vAlbedo;
+#endif
+#ifdef ALBEDO_MAP
+varying vec2 vAlbedoUv;
+#endif
+#ifdef EMISSION_MAP
+varying vec2 vEmissionUv;
+#endif
+#ifdef MIRROR
+centroid varying vec3 vMirror;
+varying vec3 vNormal;
+varying vec3 vToEye;
+#ifdef FINISH_MAP
+varying vec2 vFinishUv;
+#endif
+#endif
+`;
+
+const vertexShader = /* glsl */ `
+${varyings}
+attribute vec3 light;
+#ifdef VERTEX_ALBEDO
+attribute vec4 _albedo;
 #endif
 #ifdef USE_UV1_SET
 attribute vec2 uv1;
 #endif
 #ifdef ALBEDO_MAP
 uniform mat3 albedoMapTransform;
-varying vec2 vAlbedoUv;
 #endif
 #ifdef EMISSION_MAP
 uniform mat3 emissionMapTransform;
-varying vec2 vEmissionUv;
 #endif
 
 #ifdef MIRROR
 uniform float roughness;
-centroid varying vec3 vMirror;
-varying vec3 vNormal;
-varying vec3 vToEye;
 #ifdef FINISH_MAP
 uniform sampler2D finishMap;
 uniform mat3 finishMapTransform;
-varying vec2 vFinishUv;
 #endif
 ${lobeFunctions}
 ${mirrorFunctions}
@@ -67,32 +82,23 @@ void main() {
 }`;
 
 const fragmentShader = /* glsl */ `
+${varyings}
 uniform vec3 albedo;
 uniform float alpha;
 uniform float alphaCutoff;
 uniform vec3 emission;
 uniform bool white;
-centroid varying vec3 vLight;
-#ifdef VERTEX_ALBEDO
-varying vec4 vAlbedo;
-#endif
 #ifdef ALBEDO_MAP
 uniform sampler2D albedoMap;
-varying vec2 vAlbedoUv;
 #endif
 #ifdef EMISSION_MAP
 uniform sampler2D emissionMap;
-varying vec2 vEmissionUv;
 #endif
 #ifdef MIRROR
 uniform float metallic;
 uniform float roughness;
-centroid varying vec3 vMirror;
-varying vec3 vNormal;
-varying vec3 vToEye;
 #ifdef FINISH_MAP
 uniform sampler2D finishMap;
-varying vec2 vFinishUv;
 #endif
 ${lobeFunctions}
 /// What a surface of this base colour sends to the eye.

@@ -5,7 +5,7 @@ import { colourMapTexture, type ColourMapName } from './colour_maps';
 
 const vertexShader = /* glsl */ `
 attribute float measure;
-varying float vMeasure;
+centroid varying float vMeasure;
 varying vec3 vView;
 void main() {
   vMeasure = measure;
@@ -17,7 +17,7 @@ void main() {
 const fragmentShader = /* glsl */ `
 uniform sampler2D scale;
 uniform vec2 range; // measures at the two ends of the scale
-varying float vMeasure;
+centroid varying float vMeasure;
 varying vec3 vView;
 void main() {
   float t = clamp((vMeasure - range.x) / (range.y - range.x), 0.0, 1.0);
