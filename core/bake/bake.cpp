@@ -241,7 +241,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
 
 Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Threads& threads,
                         const Checkpoints& checkpoints) {
-  if (input.recipe.reduce) return bake_reduced(input, progress, threads);
+  if (input.recipe.reduce) return bake_reduced(input, progress, threads, checkpoints);
   BakeLog log(progress);
   log.begin("read", 0.05);
   KILN_TRY(scene, read_scene(input));

@@ -22,6 +22,7 @@ struct BakeInput {
   Recipe recipe;
   Bytes environment;  // the file the recipe's environment names; empty for constant, built-in or none
   std::string environment_name;
+  std::string made_of;             // JSON for asset.extras.kiln; empty: made from scene and recipe (provenance.h)
   std::string spill_folder = ".";  // where a reduction puts aside what does not fit into memory
 };
 

@@ -8,6 +8,7 @@
 namespace kiln {
 
 std::string provenance(const BakeInput& input) {
+  if (!input.made_of.empty()) return input.made_of;
   const std::string identity = recipe_identity(input.recipe);
   const auto bytes = std::span(reinterpret_cast<const std::uint8_t*>(identity.data()), identity.size());
   const nlohmann::ordered_json json = {{"engine", std::string("kiln ") + kEngineVersion},

@@ -7,7 +7,7 @@
 
 namespace kiln {
 
-/// A JSON object for asset.extras.kiln: engine, hashes of scene and recipe, seed.
+/// A JSON object for asset.extras.kiln: engine, hashes of scene and recipe, seed; input.made_of where that is given.
 std::string provenance(const BakeInput&);
 
 }  // namespace kiln

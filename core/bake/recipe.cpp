@@ -198,20 +198,35 @@ ReduceStep read_reduce(JsonFields& fields) {
   return step;
 }
 
-void read_steps(const json& value, Recipe& recipe, Errors& errors) {
-  if (!value.is_array() || value.size() != 1) {
-    errors.push_back({"/steps", "must be a list with one step", shown(value), "[{\"do\": \"prt\"}]"});
-    return;
-  }
-  JsonFields fields(value[0], "/steps/0", errors);
-  if (!fields.find("do", true)) return;
+/// Reads one step into the recipe. Returns whether it is `reduce`.
+bool read_step(const json& value, const std::string& pointer, Recipe& recipe, Errors& errors) {
+  JsonFields fields(value, pointer, errors);
+  if (!fields.find("do", true)) return false;
   const auto step = fields.word("do", {"prt", "radiosity", "grid", "reduce"});
-  if (!step) return;
-  if (*step == 0) recipe.steps.push_back(read_prt(fields, "/steps/0", errors));
-  if (*step == 1) recipe.radiosity = read_radiosity(fields, "/steps/0", errors);
+  if (!step) return false;
+  if (*step == 0) recipe.steps.push_back(read_prt(fields, pointer, errors));
+  if (*step == 1) recipe.radiosity = read_radiosity(fields, pointer, errors);
   if (*step == 2) recipe.grid = read_grid(fields);
   if (*step == 3) recipe.reduce = read_reduce(fields);
   fields.finish();
+  return *step == 3;
+}
+
+void read_steps(const json& value, Recipe& recipe, Errors& errors) {
+  if (!value.is_array() || value.empty() || value.size() > 2) {
+    errors.push_back({"/steps", "must be a list with one step, or with reduce and one more", shown(value),
+                      "[{\"do\": \"prt\"}], [{\"do\": \"reduce\"}, {\"do\": \"prt\"}]"});
+    return;
+  }
+  const std::size_t before = errors.size();
+  const bool first = read_step(value[0], "/steps/0", recipe, errors);
+  if (value.size() == 1) return;
+  const bool second = read_step(value[1], "/steps/1", recipe, errors);
+  if (errors.size() > before) return;
+  if (!first || second) {
+    errors.push_back({"/steps", "only reduce may come before another step, and once", shown(value),
+                      "reduce, then one of prt, radiosity, grid"});
+  }
 }
 
 Promise read_promise(const json& value, Errors& errors) {
@@ -242,7 +257,7 @@ void check_promise(const Recipe& recipe, Errors& errors) {
     errors.push_back(
         {"/quality", "cannot be promised of a radiosity step: it is baked in one pass", "", "draft, standard, final"});
   }
-  if (recipe.reduce) {
+  if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
                       "draft, standard, final"});
   }
@@ -423,10 +438,10 @@ std::string recipe_json(const Recipe& recipe) {
       {"certificate", recipe.certificate},
       {"label", recipe.label},
       {"steps", json::array()}};
+  if (recipe.reduce) out["steps"].push_back(step_json(*recipe.reduce));
   for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
   if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
   if (recipe.grid) out["steps"].push_back(step_json(*recipe.grid));
-  if (recipe.reduce) out["steps"].push_back(step_json(*recipe.reduce));
   if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
   if (const json environment = environment_json(recipe.environment); !environment.is_null())
     out["environment"] = environment;

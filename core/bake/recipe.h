@@ -106,7 +106,7 @@ struct Recipe {
   std::vector<PrtStep> steps;              // one, or none where there is a
   std::optional<RadiosityStep> radiosity;  // step `radiosity`
   std::optional<GridStep> grid;            // step `grid`
-  std::optional<ReduceStep> reduce;        // step `reduce`
+  std::optional<ReduceStep> reduce;        // step `reduce`: alone, or before one of the others
   Quality quality = Quality::standard;     // where nothing is promised
   Promise promise;
   std::uint64_t seed = 0;
@@ -114,6 +114,8 @@ struct Recipe {
   bool strict = false;
   bool certificate = true;
   std::string label;
+
+  bool bakes_light() const { return !steps.empty() || radiosity || grid; }
 };
 
 /// Parses and checks a recipe. All mistakes at once.

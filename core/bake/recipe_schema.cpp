@@ -76,6 +76,7 @@ std::string recipe_schema() {
         "samples": {"description": "rays of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
     },
+    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}]},
     "reduce": {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "not": {"required": ["triangles", "ratio"], "properties": {"triangles": {"type": "integer"}}},
@@ -103,8 +104,11 @@ std::string recipe_schema() {
       }
     },
     "steps": {
-      "type": "array", "minItems": 1, "maxItems": 1, "default": [{"do": "prt"}],
-      "items": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}, {"$ref": "#/definitions/reduce"}]}
+      "type": "array", "minItems": 1, "default": [{"do": "prt"}],
+      "anyOf": [
+        {"maxItems": 1, "items": {"anyOf": [{"$ref": "#/definitions/light"}, {"$ref": "#/definitions/reduce"}]}},
+        {"minItems": 2, "maxItems": 2, "items": [{"$ref": "#/definitions/reduce"}, {"$ref": "#/definitions/light"}]}
+      ]
     },
     "quality": {
       "default": "standard",

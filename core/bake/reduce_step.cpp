@@ -74,7 +74,7 @@ Result<Prepared> prepare(const BakeInput& input) {
   p.source = open_triangles(input.scene, {.spill_folder = input.spill_folder, .max_memory_bytes = memory}, findings);
   if (findings.failed()) return tl::make_unexpected(findings.fault());
   p.warnings = findings.warnings();
-  if (input.recipe.environment.kind != EnvironmentChoice::Kind::none)
+  if (input.recipe.environment.kind != EnvironmentChoice::Kind::none && !input.recipe.bakes_light())
     p.warnings.push_back({"environment_unused", "A reduction needs no light; the environment has no effect.", ""});
   if (input.recipe.strict && !p.warnings.empty()) {
     const Warning& first = p.warnings.front();
@@ -88,6 +88,8 @@ Result<Prepared> prepare(const BakeInput& input) {
   KILN_TRY(plan, plan_reduction(p.source, p.params));
   p.plan = plan;
   decide(p, step);
+  if (input.recipe.bakes_light())
+    p.decisions.push_back({"light", "afterwards", "its bake is planned when the reduced scene is there"});
   return p;
 }
 
@@ -179,9 +181,8 @@ std::string stem_of(const std::string& name) {
   return stem.empty() ? "model" : stem;
 }
 
-}  // namespace
-
-Result<BakeOutput> bake_reduced(const BakeInput& input, const Progress& progress, Threads& threads) {
+/// The reduction alone.
+Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progress, Threads& threads) {
   BakeLog log(progress);
   log.begin("read", 0.01);
   KILN_TRY(p, prepare(input));
@@ -217,6 +218,59 @@ Result<BakeOutput> bake_reduced(const BakeInput& input, const Progress& progress
                       {"texels_filled", reduced.maps.filled},
                       {"own_memory_bytes", std::max(reduced.own_memory_bytes, own_memory_bytes())}};
   return output_of(std::move(glb), text_of(report), log_text(p, log));
+}
+
+/// The progress of one of two bakes that follow each other.
+Progress part_of(const Progress& whole, double begin, double end) {
+  if (!whole) return {};
+  return [&whole, begin, end](ProgressEvent event) {
+    event.fraction = begin + (end - begin) * event.fraction;
+    whole(event);
+  };
+}
+
+ArtifactFile& file_of(BakeOutput& output, const char* name) {
+  return *std::find_if(output.files.begin(), output.files.end(), [&](const ArtifactFile& f) { return f.name == name; });
+}
+
+/// What the reduction did joins the report and the log of the bake that went on from it.
+void join_reports(const BakeInput& input, BakeOutput& first, BakeOutput& output) {
+  const ordered_json before = ordered_json::parse(file_of(first, "report.json").bytes);
+  ordered_json report = ordered_json::parse(file_of(output, "report.json").bytes);
+  const auto prepend = [&](const char* name) {
+    ordered_json list = before[name];
+    list.insert(list.end(), report[name].begin(), report[name].end());
+    report[name] = std::move(list);
+  };
+  for (const char* name : {"plan", "stages", "warnings"}) prepend(name);
+  report["recipe"] = ordered_json::parse(recipe_json(input.recipe));
+  report["seconds"] = report["seconds"].get<double>() + before["seconds"].get<double>();
+  report["reduce"] = before["reduce"];
+  report["reduce"]["input"] = before["scene"];
+  const std::string text = text_of(report);
+  file_of(output, "report.json").bytes = Bytes(text.begin(), text.end());
+  Bytes log = file_of(first, "log.txt").bytes;
+  const Bytes& rest = file_of(output, "log.txt").bytes;
+  log.insert(log.end(), rest.begin(), rest.end());
+  file_of(output, "log.txt").bytes = std::move(log);
+}
+
+}  // namespace
+
+Result<BakeOutput> bake_reduced(const BakeInput& input, const Progress& progress, Threads& threads,
+                                const Checkpoints& checkpoints) {
+  constexpr double kShare = 0.4;  // of the progress
+  if (!input.recipe.bakes_light()) return bake_reduction(input, progress, threads);
+  KILN_TRY(first, bake_reduction(input, part_of(progress, 0, kShare), threads));
+  BakeInput rest = input;
+  rest.scene = {.name = stem_of(input.scene.name) + ".glb",
+                .main = std::move(file_of(first, "scene.glb").bytes),
+                .resources = {}};
+  rest.recipe.reduce.reset();
+  rest.made_of = provenance(input);
+  KILN_TRY(output, bake(rest, part_of(progress, kShare, 1), threads, checkpoints));
+  join_reports(input, first, output);
+  return output;
 }
 
 Result<std::string> reduce_plan_json(const BakeInput& input) {

@@ -14,8 +14,10 @@
 
 namespace kiln {
 
-/// Fails as open_triangles, plan_reduction and reduce do.
-Result<BakeOutput> bake_reduced(const BakeInput&, const Progress&, Threads&);
+/// Where the recipe goes on with light, the reduced scene is baked by the rest of it: scene.glb and the other artefacts
+/// are that bake's, and its report says what the reduction did, too.
+/// Fails as open_triangles, plan_reduction and reduce do, and as bake does.
+Result<BakeOutput> bake_reduced(const BakeInput&, const Progress&, Threads&, const Checkpoints&);
 
 /// The plan as JSON, from the header alone.
 Result<std::string> reduce_plan_json(const BakeInput&);

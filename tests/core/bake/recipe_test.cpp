@@ -147,6 +147,20 @@ TEST(Recipe, OfAReductionHasItsOwnParametersAndSurvivesARoundTrip) {
   EXPECT_EQ(parse_recipe(R"({"steps":[{"do":"reduce","normal_map":"off"}]})")->reduce->normal_map, 0);
 }
 
+TEST(Recipe, OfAReductionMayGoOnWithLight) {
+  const auto recipe = parse_recipe(
+      R"({"quality":{"target_error":0.1},"steps":[{"do":"reduce","triangles":900},{"do":"prt","order":4}]})");
+  ASSERT_TRUE(recipe);
+  EXPECT_EQ(recipe->reduce->triangles, 900U);
+  EXPECT_EQ(recipe->steps.at(0).order, 4);
+  const auto again = parse_recipe(recipe_json(*recipe));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"prt"},{"do":"reduce"}]})"), (std::vector<std::string>{"/steps"}));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce"},{"do":"prt","order":77}]})"),
+            (std::vector<std::string>{"/steps/1/order"}));
+}
+
 TEST(Recipe, OfAReductionNamesWhatIsWrong) {
   EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce","triangles":9,"ratio":0.5}]})"),
             (std::vector<std::string>{"/steps/0/ratio"}));

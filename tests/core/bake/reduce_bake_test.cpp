@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/artifact/baked_scene.h"
+#include "core/base/sha256.h"
 #include "tests/core/bake/bake_input.h"
 #include "tests/core/reduce/models.h"
 
@@ -118,6 +120,24 @@ TEST(ReduceStep, SaysWhatDoesNotFitBeforeItStarts) {
             "memory_limit");
   EXPECT_EQ(refused_as(ball(R"({"steps":[{"do":"reduce"}],"strict":true,"environment":{"builtin":"clear"}})")),
             "strict_environment_unused");
+}
+
+TEST(ReduceStep, GoesOnWithLightWhereTheRecipeDoes) {
+  const BakeInput input = ball(
+      R"({"environment":{"builtin":"uniform"},"quality":"draft",
+          "steps":[{"do":"reduce","triangles":1000},{"do":"prt","order":2,"samples":64,"subdivide":"off"}]})");
+  const auto output = bake_once(input);
+  ASSERT_TRUE(output) << output.error().message;
+  const json report = report_of(*output);
+  EXPECT_LE(report["scene"]["triangles"], 1000);
+  EXPECT_EQ(report["reduce"]["input"]["triangles"], 19200);
+  EXPECT_GT(report["reduce"]["error"]["rms"], 0);
+  EXPECT_EQ(report["recipe"]["steps"].size(), 2U);
+  EXPECT_TRUE(report["certificate"].is_object());
+  EXPECT_EQ(report["stages"][1]["name"], "measure");
+  const auto baked = read_baked_glb(file(*output, "scene.glb"));
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(json::parse(baked->provenance)["scene_sha256"], sha256_hex(input.scene.main));
 }
 
 TEST(ReduceStep, IsCancelledLikeAnyOther) {
