@@ -192,6 +192,12 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
   p.params.begin = [&](const std::string& stage, double fraction) { log.begin(stage, fraction); };
   p.params.advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
   KILN_TRY(reduced, reduce(p.source, p.plan, p.params, threads));
+  if (reduced.map_left_out) {
+    p.warnings.push_back(
+        {"normal_map_left_out",
+         "The pieces of the surface do not fit into the largest normal map that limits.memory_mb allows.",
+         "/steps/0/normal_map"});
+  }
   log.begin("write", 1);
   Bytes glb;
   if (as_it_is) {

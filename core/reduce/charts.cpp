@@ -268,6 +268,8 @@ class Splitter {
   std::vector<Vec3d> area_, center_;
 };
 
+constexpr int kPadding = 3;  // texels around a chart: its borders stay its own in the first two mip maps
+
 /// Rectangles by falling height on shelves from the top down. False when they do not fit.
 bool pack(Atlas& atlas, double density, const std::vector<std::uint32_t>& by_height) {
   int x = 0, y = 0, shelf = 0;
@@ -289,22 +291,29 @@ bool pack(Atlas& atlas, double density, const std::vector<std::uint32_t>& by_hei
 
 }  // namespace
 
-Atlas make_atlas(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles, int side) {
-  Atlas atlas{.side = side, .charts = Splitter(position, triangles).run()};
+Atlas make_charts(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles) {
+  Atlas atlas{.charts = Splitter(position, triangles).run()};
   atlas.chart_of.resize(triangles.size());
+  for (std::uint32_t c = 0; c < atlas.charts.size(); ++c) {
+    for (const std::uint32_t t : atlas.charts[c].triangles) atlas.chart_of[t] = c;
+  }
+  return atlas;
+}
+
+bool place_charts(Atlas& atlas, int side) {
+  atlas.side = side;
   std::vector<std::uint32_t> by_height(atlas.charts.size());
   std::iota(by_height.begin(), by_height.end(), 0U);
   double area = 0;
-  for (std::uint32_t c = 0; c < atlas.charts.size(); ++c) {
-    const Chart& chart = atlas.charts[c];
-    for (const std::uint32_t t : chart.triangles) atlas.chart_of[t] = c;
-    area += (chart.high.x - chart.low.x) * (chart.high.y - chart.low.y);
-  }
+  for (const Chart& c : atlas.charts) area += (c.high.x - c.low.x) * (c.high.y - c.low.y);
   std::stable_sort(by_height.begin(), by_height.end(), [&](std::uint32_t a, std::uint32_t b) {
     return atlas.charts[a].high.y - atlas.charts[a].low.y > atlas.charts[b].high.y - atlas.charts[b].low.y;
   });
-  // The largest density that fits, to a hundredth; padding shrinks where there are too many charts for it.
-  while (atlas.padding > 0 && !pack(atlas, 0, by_height)) --atlas.padding;
+  // Padding shrinks where there are too many charts for it.
+  for (atlas.padding = kPadding; !pack(atlas, 0, by_height); --atlas.padding) {
+    if (atlas.padding == 1) return false;
+  }
+  // The largest density that fits, to a hundredth.
   double low = 0, high = 2 * side / std::sqrt(std::max(area, 1e-12));
   for (int i = 0; i < 24 && high - low > 0.01 * low; ++i) {
     const double middle = 0.5 * (low + high);
@@ -312,7 +321,7 @@ Atlas make_atlas(const std::vector<Vec3d>& position, const std::vector<Triangle>
   }
   atlas.density = low;
   pack(atlas, low, by_height);
-  return atlas;
+  return true;
 }
 
 }  // namespace kiln

@@ -32,7 +32,7 @@ struct Chart {
 };
 
 struct Atlas {
-  int side = 0, padding = 3;
+  int side = 0, padding = 0;
   double density = 0;  // texels per unit length
   std::vector<Chart> charts;
   std::vector<std::uint32_t> chart_of;  // of each triangle
@@ -42,6 +42,10 @@ struct Atlas {
 /// lengths in the texture are no less than this share of those on the surface.
 inline constexpr double kSteepest = 0.72;
 
-Atlas make_atlas(const std::vector<Vec3d>& position, const std::vector<Triangle>&, int side);
+/// Charts, not yet placed.
+Atlas make_charts(const std::vector<Vec3d>& position, const std::vector<Triangle>&);
+
+/// Places the charts of an atlas in a square of this many texels. False where not even empty ones fit.
+bool place_charts(Atlas&, int side);
 
 }  // namespace kiln

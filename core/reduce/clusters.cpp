@@ -109,7 +109,8 @@ struct Grid {
     return n;
   }
   void reserve(std::uint64_t cells) {
-    for (Shard& s : shards) s.keys.reserve(cells / kShards), s.cells.reserve(cells / kShards);
+    const std::size_t each = cells / kShards * 51 / 50 + 64;  // hashing spreads them to a hundredth
+    for (Shard& s : shards) s.keys.reserve(each), s.cells.reserve(each);
   }
 };
 

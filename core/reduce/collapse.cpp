@@ -66,7 +66,7 @@ class Collapser {
     for (std::uint32_t v = 0; v < vertices; ++v) find_border(v);
   }
 
-  void run(std::size_t target, Threads& threads) {
+  void run(std::size_t target, Threads& threads, const std::function<void(std::size_t)>& tell) {
     for (std::uint32_t v = 0; v < s_.position.size(); ++v) {
       for (const std::uint32_t w : ring(v)) {
         if (v < w) push(v, w);
@@ -74,6 +74,7 @@ class Collapser {
     }
     for (std::size_t step = 0; left_ > target && !queue_.empty(); ++step) {
       if (step % 4096 == 0) threads.check();
+      if (step % 65536 == 0 && tell) tell(left_);
       const Candidate c = queue_.pop();
       if (age_[c.a] + age_[c.b] != c.age) continue;
       const Vec3d place = best_place(c.a, c.b);
@@ -294,9 +295,9 @@ class Collapser {
 
 }  // namespace
 
-void collapse(Surface& surface, std::size_t triangles, Threads& threads) {
-  if (surface.triangles.size() > triangles) Collapser(surface, false).run(triangles, threads);
-  if (surface.triangles.size() > triangles) Collapser(surface, true).run(triangles, threads);
+void collapse(Surface& surface, std::size_t triangles, Threads& threads, const std::function<void(std::size_t)>& tell) {
+  if (surface.triangles.size() > triangles) Collapser(surface, false).run(triangles, threads, tell);
+  if (surface.triangles.size() > triangles) Collapser(surface, true).run(triangles, threads, tell);
   drop_unused(surface);
 }
 

@@ -11,12 +11,15 @@
 // Repeat   same bits always: one thread, ties by vertex number
 // Differs  a closed piece of four triangles goes as a whole; non-manifold edges take part
 
+#include <functional>
+
 #include "core/base/threads.h"
 #include "core/reduce/surface.h"
 
 namespace kiln {
 
-/// Leaves at most `triangles` where it can.
-void collapse(Surface&, std::size_t triangles, Threads& threads);
+/// Leaves at most `triangles` where it can. `tell(left)` is called now and then, with the triangles that are left.
+/// Throws Cancelled when `threads` is stopped.
+void collapse(Surface&, std::size_t triangles, Threads& threads, const std::function<void(std::size_t)>& tell = {});
 
 }  // namespace kiln

@@ -8,7 +8,7 @@
 namespace kiln {
 
 /// Bytes of a triangle while it is collected and collapsed: half a vertex, its sample, its place in the queue.
-inline constexpr std::uint64_t kCollectedBytes = 330;
+inline constexpr std::uint64_t kCollectedBytes = 220;
 
 /// All triangles, corners at bit-equal places joined; degenerate and repeated ones are left out. Samples hold the
 /// planes of the triangles around, a third each, and the lines along borders. Memory  kCollectedBytes a triangle,

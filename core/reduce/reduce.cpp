@@ -71,6 +71,16 @@ int map_side(const TriangleSource& source, const Reduce& params, std::uint64_t u
   return side;
 }
 
+/// The map as planned, or a finer one where its charts take more; nothing where memory does not allow that.
+std::optional<Atlas> atlas_of(const Surface& surface, const ReducePlan& plan) {
+  if (plan.map_side == 0) return std::nullopt;
+  Atlas atlas = make_charts(surface.position, surface.triangles);
+  for (int side = plan.map_side; side <= std::max(plan.map_side, plan.most_map_side); side *= 2) {
+    if (place_charts(atlas, side)) return atlas;
+  }
+  return std::nullopt;
+}
+
 tl::unexpected<Fault> too_little(std::uint64_t needed, const Reduce& params) {
   const auto megabytes = [](std::uint64_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20); };
   return fault("memory_limit", "the reduction would need about " + megabytes(needed) +
@@ -101,6 +111,10 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
     return plan;
   }
   plan.map_side = map_side(source, params, usable > result ? usable - result : 0);
+  plan.most_map_side = 8192;
+  while (std::uint64_t(plan.most_map_side) * std::uint64_t(plan.most_map_side) * kTexelBytes + result > usable &&
+         plan.most_map_side > 64)
+    plan.most_map_side /= 2;
   const std::uint64_t whole = source.triangles * kCollectedBytes;
   const auto wanted = static_cast<std::uint64_t>(kMoreThanAsked * 0.5 * static_cast<double>(params.triangles));
   std::uint64_t first = whole;
@@ -144,14 +158,20 @@ Result<Reduced> reduce(const TriangleSource& file, const ReducePlan& plan, const
   out.clustered_triangles = surface.triangles.size();
   threads.check();
   watched.begin("collapse", 0.6);
-  if (!plan.unchanged) collapse(surface, params.triangles, threads);
+  const std::size_t before = surface.triangles.size();
+  if (!plan.unchanged && before > params.triangles) {
+    collapse(surface, params.triangles, threads, [&](std::size_t left) {
+      watched.look();
+      if (params.advance) params.advance(before - left, before - params.triangles);
+    });
+  }
   if (surface.triangles.empty()) {
     return fault("nothing_left", "All triangles are smaller than a cell, or have no area: ask for more triangles.",
                  source.name);
   }
   watched.begin("atlas", 0.65);
-  std::optional<Atlas> atlas;
-  if (plan.map_side > 0) atlas = make_atlas(surface.position, surface.triangles, plan.map_side);
+  const std::optional<Atlas> atlas = atlas_of(surface, plan);
+  out.map_left_out = plan.map_side > 0 && !atlas;
   out.mesh = delivered_mesh(surface, atlas ? &*atlas : nullptr, source.colors);
   surface = {};
   if (atlas) out.charts = atlas->charts.size();

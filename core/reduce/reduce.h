@@ -32,6 +32,7 @@ struct ReducePlan {
   bool in_core = false;                   // collected whole, else clustered
   std::uint64_t cells = 0, vertices = 0;  // of the clustering: capacity, and what is left for the collapse
   int map_side = 0;
+  int most_map_side = 0;  // what memory allows, where charts do not fit into `map_side`
   std::uint64_t memory_bytes = 0;
   double seconds = 0;
 };
@@ -40,7 +41,8 @@ Result<ReducePlan> plan_reduction(const TriangleSource&, const Reduce&);
 struct Reduced {
   Mesh mesh;  // unit cube
   UnitFrame frame;
-  SurfaceMaps maps;  // side 0: none
+  SurfaceMaps maps;           // side 0: none
+  bool map_left_out = false;  // it was asked for, and its charts do not fit
   GeometricError error;
   double normal_degrees = 0, plain_normal_degrees = 0;  // RMS, through the map and without it
   std::uint64_t input_triangles = 0, clustered_triangles = 0;

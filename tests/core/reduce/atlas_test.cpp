@@ -9,7 +9,13 @@ namespace {
 
 using testing::Model;
 
-Atlas atlas_of(const Model& model, int side = 512) { return make_atlas(model.position, model.triangles, side); }
+Atlas placed(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles, int side) {
+  Atlas atlas = make_charts(position, triangles);
+  EXPECT_TRUE(place_charts(atlas, side));
+  return atlas;
+}
+
+Atlas atlas_of(const Model& model, int side = 512) { return placed(model.position, model.triangles, side); }
 
 /// Each texel centre belongs to at most one triangle of all charts, and to its chart's rectangle without padding.
 void expect_no_overlap(const Model& model, const Atlas& atlas) {
@@ -85,6 +91,17 @@ TEST(Atlas, KeepsLengthsInProportion) {
   EXPECT_GT(chart.width, 240);  // the largest that fits, to a hundredth and a texel
   EXPECT_NEAR(chart.width - 7, 2 * (chart.height - 7), 3);
   EXPECT_LT(dot(cross(chart.normal, chart.tangent) - chart.up, cross(chart.normal, chart.tangent) - chart.up), 1e-24);
+}
+
+TEST(Atlas, SaysWhenItsChartsDoNotFit) {
+  Model many;
+  for (int i = 0; i < 200; ++i) {
+    append(many, testing::sheet(1, 1, [&](double u, double v) { return Vec3d{u + 3 * i, v, 0.0}; }));
+  }
+  Atlas atlas = make_charts(many.position, many.triangles);
+  // The joined sheets are one row, or two hundred charts of at least three texels a side.
+  EXPECT_FALSE(place_charts(atlas, 2));
+  EXPECT_TRUE(place_charts(atlas, 64));
 }
 
 TEST(Atlas, HoldsOneTriangleAndOneWithoutArea) {

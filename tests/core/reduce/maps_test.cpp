@@ -6,6 +6,12 @@
 namespace kiln {
 namespace {
 
+Atlas placed(const std::vector<Vec3d>& position, const std::vector<Triangle>& triangles, int side) {
+  Atlas atlas = make_charts(position, triangles);
+  EXPECT_TRUE(place_charts(atlas, side));
+  return atlas;
+}
+
 Surface surface_of(const testing::Model& model) {
   Surface s;
   for (const Vec3d& p : model.position) s.position.push_back(p * 0.5);
@@ -17,7 +23,7 @@ Surface surface_of(const testing::Model& model) {
 
 TEST(DeliveredMesh, HasRightHandedFramesThatFollowTheTexture) {
   const Surface s = surface_of(testing::sphere(6));
-  const Atlas atlas = make_atlas(s.position, s.triangles, 512);
+  const Atlas atlas = placed(s.position, s.triangles, 512);
   const Mesh mesh = delivered_mesh(s, &atlas, false);
   ASSERT_EQ(mesh.triangles.size(), s.triangles.size());
   for (const Triangle& t : mesh.triangles) {
@@ -43,7 +49,7 @@ TEST(DeliveredMesh, HasRightHandedFramesThatFollowTheTexture) {
 
 TEST(DeliveredMesh, KeepsTheEdgesOfACubeSharp) {
   const Surface s = surface_of(testing::cube(2));
-  const Atlas atlas = make_atlas(s.position, s.triangles, 256);
+  const Atlas atlas = placed(s.position, s.triangles, 256);
   const Mesh mesh = delivered_mesh(s, &atlas, false);
   for (const Vec3f& n : mesh.normal)
     EXPECT_NEAR(std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)}), 1, 1e-6);  // of one side alone
@@ -57,7 +63,7 @@ std::vector<Texel> even_texels(const Atlas& atlas, const Vec3f& normal, const Ve
 
 TEST(Maps, ShowTheNormalsThatFellIntoThem) {
   const Surface s = surface_of(testing::sheet(3, 3, [](double u, double v) { return Vec3d{u, v, 0}; }));
-  const Atlas atlas = make_atlas(s.position, s.triangles, 64);
+  const Atlas atlas = placed(s.position, s.triangles, 64);
   const Mesh mesh = delivered_mesh(s, &atlas, true);
   const Vec3f tilted = normalized(Vec3f{0.3F, -0.2F, 1});
   Threads threads(2);
@@ -77,7 +83,7 @@ TEST(Maps, ShowTheNormalsThatFellIntoThem) {
 
 TEST(Maps, FillHolesFromWhatIsAround) {
   const Surface s = surface_of(testing::sheet(3, 3, [](double u, double v) { return Vec3d{u, v, 0}; }));
-  const Atlas atlas = make_atlas(s.position, s.triangles, 64);
+  const Atlas atlas = placed(s.position, s.triangles, 64);
   const Mesh mesh = delivered_mesh(s, &atlas, true);
   const Vec3f left = normalized(Vec3f{-1, 0, 1}), right = normalized(Vec3f{1, 0, 1});
   auto texels = even_texels(atlas, left, {0, 0, 0});
@@ -104,7 +110,7 @@ TEST(Maps, FillHolesFromWhatIsAround) {
 
 TEST(Maps, OfAChartThatNothingFellIntoAreFlat) {
   const Surface s = surface_of(testing::sheet(1, 1, [](double u, double v) { return Vec3d{u, v, 0}; }));
-  const Atlas atlas = make_atlas(s.position, s.triangles, 64);
+  const Atlas atlas = placed(s.position, s.triangles, 64);
   const Mesh mesh = delivered_mesh(s, &atlas, true);
   Threads threads(1);
   const SurfaceMaps maps = make_maps(mesh, atlas, std::vector<Texel>(64 * 64), true, threads);

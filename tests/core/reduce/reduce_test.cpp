@@ -130,6 +130,27 @@ TEST(Reduce, OfNothingButDegenerateTrianglesSaysSo) {
   }
 }
 
+TEST(Reduce, MakesAFinerMapThanAskedForWhereItsChartsNeedIt) {
+  Model model;  // a thousand cubes, six charts each
+  for (int i = 0; i < 1000; ++i) {
+    Model one = testing::cube(2);
+    for (Vec3d& p : one.position) p = p * 0.3 + Vec3d{double(i % 10), double(i / 10 % 10), double(i / 100)};
+    append(model, one);
+  }
+  const TriangleSource source = testing::source_of(model);
+  Threads threads(2);
+  for (const std::uint64_t megabytes : {4096, 128}) {
+    const Reduce params{.triangles = 20'000, .map_side = 64, .memory_bytes = megabytes << 20};
+    auto plan = plan_reduction(source, params);
+    ASSERT_TRUE(plan);
+    if (megabytes == 128) plan->most_map_side = 128;
+    const auto out = reduce(source, *plan, params, threads);
+    ASSERT_TRUE(out);
+    EXPECT_EQ(out->map_left_out, megabytes == 128);
+    EXPECT_EQ(out->maps.side > 64, megabytes != 128);
+  }
+}
+
 TEST(Reduce, LeavesAModelAloneThatIsSmallEnough) {
   const auto out = reduced(testing::cube(2), {.triangles = 48, .map_side = 64});
   ASSERT_TRUE(out);
