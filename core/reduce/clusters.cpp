@@ -3,116 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <queue>
 
-#include "core/base/index_table.h"
-#include "core/base/random.h"
+#include "core/reduce/cluster_tree.h"
 
 namespace kiln {
 namespace {
 
-constexpr std::size_t kShards = 8, kBlock = 4096;
-constexpr int kAxisBits = 20;
-constexpr double kBorderWeight = 4;  // of squared lengths beside areas: borders move less than surfaces
+using namespace clustering;
 
-struct Cell {
-  Quadric quadric;
-  Vec3d edge, moment;  // E
-  Vec3d sum;           // of corners, weighted by area
-  double weight = 0;
-  Vec3f color;
-
-  Cell& operator+=(const Cell& o) {
-    quadric += o.quadric;
-    edge += o.edge, moment += o.moment, sum += o.sum;
-    weight += o.weight;
-    color += o.color;
-    return *this;
-  }
-  Vec3d mean() const { return sum / weight; }
-  /// Planes and border together. What rounding leaves of edges that cancel is far below a hundredth of a cell.
-  Quadric whole(double cell_size) const {
-    Quadric q = quadric;
-    if (length(edge) > 0.01 * cell_size) q.add_line(edge, moment, kBorderWeight);
-    return q;
-  }
-};
-
-/// Cells of one size over the unit cube, by number.
-struct Lattice {
-  double size;    // of a cell, unit lengths
-  int level = 0;  // cells of `size` are 2^level along a side
-
-  std::uint64_t key(const Vec3d& unit) const {
-    const auto along = [&](double x) {
-      const auto i = static_cast<std::int64_t>(std::floor((x + 0.5) / size));
-      return static_cast<std::uint64_t>(std::clamp<std::int64_t>(i, 0, (1 << kAxisBits) - 1)) >> level;
-    };
-    return along(unit.x) << (2 * kAxisBits) | along(unit.y) << kAxisBits | along(unit.z);
-  }
-  double side() const { return size * static_cast<double>(1 << level); }
-};
-
-std::uint64_t halved(std::uint64_t key) {
-  constexpr std::uint64_t kAxis = (1ULL << kAxisBits) - 1;
-  const auto half = [&](int shift) { return (key >> shift & kAxis) >> 1 << shift; };
-  return half(2 * kAxisBits) | half(kAxisBits) | half(0);
-}
-
-/// Spreads the bits of a key so that cells near each other in the octree are near in order.
-std::uint64_t morton(std::uint64_t key) {
-  constexpr std::uint64_t kAxis = (1ULL << kAxisBits) - 1;
-  std::uint64_t out = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::uint64_t x = key >> (axis * kAxisBits) & kAxis;
-    x = (x | x << 32) & 0x1f00000000ffff;
-    x = (x | x << 16) & 0x1f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    x = (x | x << 2) & 0x1249249249249249;
-    out |= x << axis;
-  }
-  return out;
-}
-
-std::size_t shard_of(std::uint64_t key) { return mix64(key) >> 61; }
-static_assert(kShards == 8);
-
-/// One part of the cells: those whose key hashes into it.
-struct Shard {
-  std::vector<std::uint64_t> keys;
-  std::vector<Cell> cells;
-  IndexTable table;
-
-  std::uint32_t find(std::uint64_t key) const {
-    return table.find(mix64(key), [&](std::uint32_t i) { return keys[i] == key; });
-  }
-  Cell& at(std::uint64_t key) {
-    std::uint32_t i = find(key);
-    if (i == IndexTable::kNone) {
-      i = static_cast<std::uint32_t>(keys.size());
-      keys.push_back(key);
-      cells.emplace_back();
-      table.add(i, [&](std::uint32_t k) { return mix64(keys[k]); });
-    }
-    return cells[i];
-  }
-};
-
-struct Grid {
-  Lattice lattice{1};
-  std::array<Shard, kShards> shards;
-
-  std::size_t size() const {
-    std::size_t n = 0;
-    for (const Shard& s : shards) n += s.keys.size();
-    return n;
-  }
-  void reserve(std::uint64_t cells) {
-    const std::size_t each = cells / kShards * 51 / 50 + 64;  // hashing spreads them to a hundredth
-    for (Shard& s : shards) s.keys.reserve(each), s.cells.reserve(each);
-  }
-};
+constexpr std::size_t kBlock = 4096;
 
 /// Joins cells two by two by two.
 void coarsen(Grid& grid) {
@@ -229,18 +128,6 @@ Lattice first_lattice(const Extent& extent, std::uint64_t cells) {
   return {std::clamp(size, kFinest, 1.0)};
 }
 
-/// Which vertex each cell of a shard has become.
-using Leaves = std::array<std::vector<std::uint32_t>, kShards>;
-
-/// A leaf's vertex. It may leave its cell by a little, not more.
-void add_vertex(Surface& out, const Cell& cell, double side) {
-  const Vec3d mean = cell.mean();
-  const Quadric q = cell.whole(side);
-  const Vec3d best = least_point(q, mean);
-  out.position.push_back(length(best - mean) < side ? best : mean);
-  out.sample.push_back({q, cell.color, cell.weight});
-}
-
 Leaves uniform_leaves(const Grid& grid, Surface& out) {
   Leaves leaves;
   for (std::size_t s = 0; s < kShards; ++s) {
@@ -251,140 +138,6 @@ Leaves uniform_leaves(const Grid& grid, Surface& out) {
   }
   return leaves;
 }
-
-/// The octree above the cells. A node is a run of cells in Morton order and lives in the first one's place.
-class Joiner {
- public:
-  explicit Joiner(Grid& grid) : grid_(grid) {
-    for (std::uint32_t s = 0; s < kShards; ++s) {
-      for (std::uint32_t i = 0; i < grid.shards[s].keys.size(); ++i)
-        order_.push_back({morton(grid.shards[s].keys[i]), s, i});
-    }
-    std::sort(order_.begin(), order_.end(), [](const Place& a, const Place& b) { return a.code < b.code; });
-    levels_.push_back(bottom());
-    while (levels_.size() <= kMostLevels && levels_.back().first.size() > 1) levels_.push_back(above(levels_.back()));
-  }
-
-  /// Joins until at most `vertices` leaves are left, or nothing can be joined any more.
-  void join(std::size_t vertices) {
-    std::size_t leaves = order_.size();
-    for (std::uint32_t n = 0; levels_.size() > 1 && n < levels_[1].first.size(); ++n) consider(1, n);
-    while (leaves > vertices && !queue_.empty()) {
-      const Candidate next = queue_.top();
-      queue_.pop();
-      Level& level = levels_[next.level];
-      const std::size_t children = level.end_child(next.node) - level.first_child[next.node];
-      cell_at(level.first[next.node]) = joined(next.level, next.node);
-      level.leaf[next.node] = true;
-      leaves -= children - 1;
-      if (std::size_t{next.level} + 1 == levels_.size()) continue;
-      const std::uint32_t parent = level.parent[next.node];
-      if (all_leaves(next.level + 1, parent)) consider(next.level + 1, parent);
-    }
-  }
-
-  /// Vertices of the leaves, in Morton order.
-  Leaves leaves(Surface& out) {
-    Leaves result;
-    for (std::size_t s = 0; s < kShards; ++s) result[s].resize(grid_.shards[s].keys.size());
-    for (std::uint32_t at = 0; at < order_.size();) {
-      std::size_t level = 0;
-      std::uint32_t node = at;
-      while (level + 1 < levels_.size() && levels_[level + 1].leaf[levels_[level].parent[node]])
-        node = levels_[level++].parent[node];
-      const std::uint32_t end = levels_[level].end(node, order_.size());
-      const auto vertex = static_cast<std::uint32_t>(out.position.size());
-      add_vertex(out, cell_at(at), grid_.lattice.side() * static_cast<double>(1 << level));
-      for (; at < end; ++at) result[order_[at].shard][order_[at].index] = vertex;
-    }
-    return result;
-  }
-
- private:
-  static constexpr std::size_t kMostLevels = 6;  // a leaf is at most 64 cells along a side
-
-  struct Place {
-    std::uint64_t code;
-    std::uint32_t shard, index;
-  };
-  struct Level {
-    std::vector<std::uint32_t> first;        // cell, in order, of each node
-    std::vector<std::uint32_t> first_child;  // node of the level below
-    std::vector<std::uint32_t> parent;
-    std::vector<bool> leaf;  // has been joined into one, or is a cell
-    std::size_t children = 0;
-
-    std::uint32_t end(std::uint32_t node, std::size_t cells) const {
-      return node + 1 < first.size() ? first[node + 1] : static_cast<std::uint32_t>(cells);
-    }
-    std::uint32_t end_child(std::uint32_t node) const {
-      return node + 1 < first_child.size() ? first_child[node + 1] : static_cast<std::uint32_t>(children);
-    }
-  };
-  struct Candidate {
-    double cost;
-    std::uint32_t level, node;
-    bool operator<(const Candidate& o) const {  // the cheapest first, then by place
-      if (cost != o.cost) return cost > o.cost;
-      return level != o.level ? level > o.level : node > o.node;
-    }
-  };
-
-  Cell& cell_at(std::uint32_t at) { return grid_.shards[order_[at].shard].cells[order_[at].index]; }
-
-  Level bottom() const {
-    Level level;
-    for (std::uint32_t i = 0; i < order_.size(); ++i) level.first.push_back(i);
-    level.leaf.assign(order_.size(), true);
-    return level;
-  }
-  Level above(Level& below) const {
-    Level level;
-    const std::size_t shift = 3 * levels_.size();
-    below.parent.resize(below.first.size());
-    for (std::uint32_t n = 0; n < below.first.size(); ++n) {
-      const std::uint32_t cell = below.first[n];
-      const bool fresh = level.first.empty() || order_[level.first.back()].code >> shift != order_[cell].code >> shift;
-      if (fresh) level.first.push_back(cell), level.first_child.push_back(n);
-      below.parent[n] = static_cast<std::uint32_t>(level.first.size() - 1);
-    }
-    level.children = below.first.size();
-    level.leaf.assign(level.first.size(), false);
-    return level;
-  }
-  bool all_leaves(std::uint32_t level, std::uint32_t node) const {
-    const Level& l = levels_[level];
-    for (std::uint32_t c = l.first_child[node]; c < l.end_child(node); ++c) {
-      if (!levels_[level - 1].leaf[c]) return false;
-    }
-    return true;
-  }
-  Cell joined(std::uint32_t level, std::uint32_t node) {
-    const Level& l = levels_[level];
-    Cell sum;
-    for (std::uint32_t c = l.first_child[node]; c < l.end_child(node); ++c) sum += cell_at(levels_[level - 1].first[c]);
-    return sum;
-  }
-  double error(const Cell& cell, std::uint32_t level) const {
-    const double side = grid_.lattice.side() * static_cast<double>(1 << level);
-    const Quadric q = cell.whole(side);
-    return q.at(least_point(q, cell.mean()));
-  }
-  void consider(std::uint32_t level, std::uint32_t node) {
-    const Level& l = levels_[level];
-    double apart = 0;
-    for (std::uint32_t c = l.first_child[node]; c < l.end_child(node); ++c)
-      apart += error(cell_at(levels_[level - 1].first[c]), level - 1);
-    const auto saved = static_cast<double>(l.end_child(node) - l.first_child[node] - 1);
-    const double more = std::max(0.0, error(joined(level, node), level) - apart);
-    queue_.push({saved > 0 ? more / saved : 0, level, node});
-  }
-
-  Grid& grid_;
-  std::vector<Place> order_;
-  std::vector<Level> levels_;
-  std::priority_queue<Candidate> queue_;
-};
 
 /// Triangles without repetition: turned so that their smallest corner comes first.
 class TriangleSet {
@@ -456,9 +209,7 @@ Result<Surface> cluster(const TriangleSource& source, const Extent& extent, cons
   Surface out;
   Leaves leaves;
   if (params.vertices > 0 && params.vertices < grid->size()) {
-    Joiner joiner(*grid);
-    joiner.join(params.vertices);
-    leaves = joiner.leaves(out);
+    leaves = join_leaves(*grid, params.vertices, out);
   } else {
     leaves = uniform_leaves(*grid, out);
   }

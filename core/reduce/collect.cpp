@@ -9,8 +9,6 @@
 namespace kiln {
 namespace {
 
-constexpr double kBorderWeight = 4;
-
 class Collector {
  public:
   explicit Collector(const UnitFrame& frame) : frame_(frame) {}

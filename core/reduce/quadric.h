@@ -8,6 +8,9 @@
 
 namespace kiln {
 
+/// Of lines along borders, squared lengths beside the areas of planes: borders move less than surfaces.
+inline constexpr double kBorderWeight = 4;
+
 /// Q(p) = p A p + 2 b p + c. Planes are weighted by area, lines by squared length: Q is an area times a squared
 /// distance.
 struct Quadric {
