@@ -10,6 +10,7 @@
 #include "core/artifact/triangle_stream.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/provenance.h"
+#include "core/reduce/measure.h"
 #include "core/reduce/reduce.h"
 
 namespace kiln {
@@ -191,7 +192,13 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
   const bool as_it_is = p.plan.unchanged && looks_like_glb(file) && input.scene.resources.empty();
   p.params.begin = [&](const std::string& stage, double fraction) { log.begin(stage, fraction); };
   p.params.advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
-  KILN_TRY(reduced, reduce(p.source, p.plan, p.params, threads));
+  const auto make = [&]() -> Result<Reduced> {
+    if (!as_it_is) return reduce(p.source, p.plan, p.params, threads);
+    log.begin("measure", 0.9);  // its numbers are checked all the same
+    KILN_TRY(extent, measure(p.source, threads));
+    return Reduced{.frame = extent.frame(), .input_triangles = extent.triangles};
+  };
+  KILN_TRY(reduced, make());
   if (reduced.map_left_out) {
     p.warnings.push_back(
         {"normal_map_left_out",
@@ -214,7 +221,8 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
   ordered_json report = report_head(input, p, log);
   report["scene"]["triangles"] = reduced.input_triangles;
   const std::uint64_t triangles = p.plan.unchanged ? reduced.input_triangles : reduced.mesh.triangles.size();
-  report["result"] = {{"triangles", triangles}, {"vertices", reduced.mesh.position.size()}, {"bytes", glb.size()}};
+  const std::size_t vertices = as_it_is ? p.source.vertices : reduced.mesh.position.size();
+  report["result"] = {{"triangles", triangles}, {"vertices", vertices}, {"bytes", glb.size()}};
   report["reduce"] = {{"unchanged", p.plan.unchanged},
                       {"clustered_triangles", reduced.clustered_triangles},
                       {"error", error_object(reduced)},

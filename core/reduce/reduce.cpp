@@ -107,7 +107,6 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
   if (plan.unchanged) {
     plan.memory_bytes = taken + source.triangles * kCollectedBytes;
     plan.seconds = 2e-6 * static_cast<double>(source.triangles);
-    if (plan.memory_bytes > params.memory_bytes) return too_little(plan.memory_bytes, params);
     return plan;
   }
   plan.map_side = map_side(source, params, usable > result ? usable - result : 0);
@@ -140,6 +139,7 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
 }
 
 Result<Reduced> reduce(const TriangleSource& file, const ReducePlan& plan, const Reduce& params, Threads& threads) {
+  if (plan.memory_bytes > params.memory_bytes) return too_little(plan.memory_bytes, params);
   Reduced out;
   const Watched watched(file, params, out.own_memory_bytes);
   const TriangleSource source = watched.source();
