@@ -34,7 +34,7 @@ inline Model sheet(int n, int m, const std::function<Vec3d(double, double)>& pla
   return out;
 }
 
-inline void append(Model& to, const Model& from) {
+inline void append(Model& to, Model from) {  // a copy: a model may be appended to itself
   const auto first = static_cast<std::uint32_t>(to.position.size());
   to.position.insert(to.position.end(), from.position.begin(), from.position.end());
   to.color.insert(to.color.end(), from.color.begin(), from.color.end());
