@@ -42,7 +42,7 @@ struct TransferEncoding {
 };
 
 struct Encoding {
-  int position_bits = 16;  // over the unit cube, one grid for all primitives (no cracks)
+  int position_bits = 20;  // over the unit cube, one grid for all primitives (no cracks)
   int normal_bits = 12;
   int texcoord_bits = 14;
   TransferEncoding transfer;

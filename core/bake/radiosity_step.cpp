@@ -221,9 +221,8 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
                              .values = [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
                              .bounded = {0, 1, 2},
                              .hidden = hidden_test(tracer),
-                             .pierced = pierce_test(tracer),
                              .rough = [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
-    const Mesh base = plan.split && params.bounces != 0 ? refine_base(scene.mesh, plan, threads) : scene.mesh;
+    const Mesh base = plan.split ? base_mesh(scene, plan, source, params.bounces != 0, threads) : scene.mesh;
     Subdivide split = plan.subdivide;
     if (!plan.split) split = {.triangles = 0};
     Subdivided fine = subdivide(base, source, split, threads);

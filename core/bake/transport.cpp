@@ -7,6 +7,7 @@
 #include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/prt/cut_contacts.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/interreflection.h"
 #include "core/trace/tracer.h"
@@ -40,7 +41,6 @@ class DirectSource {
         .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
         .bounded = {lamp_columns()},
         .hidden = hidden_test(tracer_),
-        .pierced = pierce_test(tracer_),
         .rough =
             [this](std::span<const TransferPoint> batch) {
               return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));
@@ -117,11 +117,31 @@ class DirectSource {
   float lamp_scale_;
 };
 
+/// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
+/// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
+/// triangle's perimeter.
+Mesh split_longest(const Mesh& mesh, const Plan& plan, Threads& threads) {
+  const std::uint64_t input = mesh.triangles.size();
+  const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
+  const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
+  const ValueSource positions{3, [](std::span<const TransferPoint> points) {
+                                std::vector<float> values;
+                                for (const TransferPoint& p : points)
+                                  values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
+                                return values;
+                              }};
+  // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
+  const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
+  return subdivide(mesh, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
+                   threads)
+      .mesh;
+}
+
 /// The mesh to light and the joined columns of direct light at its vertices.
-Subdivided bake_direct(const Mesh& mesh, const Plan& plan, DirectSource& source, Threads& threads) {
-  if (!plan.split) return subdivide(mesh, source.source(), {.triangles = 0}, threads);
-  const Mesh base = plan.bounces > 0 ? refine_base(mesh, plan, threads) : mesh;
-  return subdivide(base, source.source(), plan.subdivide, threads);
+Subdivided bake_direct(const Scene& scene, const Plan& plan, DirectSource& source, Threads& threads) {
+  if (!plan.split) return subdivide(scene.mesh, source.source(), {.triangles = 0}, threads);
+  const ValueSource light = source.source();
+  return subdivide(base_mesh(scene, plan, light, plan.bounces > 0, threads), light, plan.subdivide, threads);
 }
 
 constexpr std::size_t kProbes = 256;
@@ -200,24 +220,10 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 
 }  // namespace
 
-/// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
-/// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
-/// triangle's perimeter.
-Mesh refine_base(const Mesh& mesh, const Plan& plan, Threads& threads) {
-  const std::uint64_t input = mesh.triangles.size();
-  const std::uint64_t budget = input + (plan.subdivide.triangles - input) / 4;
-  const double area_of_one = surface_area(mesh) / static_cast<double>(budget);
-  const ValueSource positions{3, [](std::span<const TransferPoint> points) {
-                                std::vector<float> values;
-                                for (const TransferPoint& p : points)
-                                  values.insert(values.end(), {p.position.x, p.position.y, p.position.z});
-                                return values;
-                              }};
-  // Right triangles of legs sqrt(2 area) have a perimeter of 4.83 sqrt(area); 1.4 times it stops before the budget.
-  const auto perimeter = static_cast<float>(1.4 * 4.83 * std::sqrt(area_of_one));
-  return subdivide(mesh, positions, {.measure = SplitMeasure::eq3, .threshold = perimeter, .triangles = budget},
-                   threads)
-      .mesh;
+Mesh base_mesh(const Scene& scene, const Plan& plan, const ValueSource& source, bool bounces, Threads& threads) {
+  const std::uint64_t input = scene.mesh.triangles.size(), budget = input + (plan.subdivide.triangles - input) / 2;
+  const Mesh cut = cut_where_light_jumps(scene, source, budget, threads);
+  return bounces ? split_longest(cut, plan, threads) : cut;
 }
 
 DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
@@ -249,7 +255,7 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
     const Tracer tracer(scene, threads);
     const DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
     DirectSource source(tracer, plan, rays, log, threads);
-    Subdivided direct = bake_direct(scene.mesh, plan, source, threads);
+    Subdivided direct = bake_direct(scene, plan, source, threads);
     source.separate(direct.values, sky, lamps);
     stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats.rays);

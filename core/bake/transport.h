@@ -34,8 +34,10 @@ inline constexpr int kRoughRays = 4;  // so many times fewer for points that onl
 DirectTransfer sky_rays(const Tracer&, const Plan&, const std::vector<double>& band_power, std::uint64_t seed,
                         Threads&);
 
-/// A quarter of the planned triangles on the longest ones: reflected light varies where direct light does not.
-Mesh refine_base(const Mesh&, const Plan&, Threads&);
+/// The mesh that subdivision starts from. At most half of the new triangles go to contact lines where the light of
+/// `source` jumps; with `bounces` a quarter of the rest to the longest triangles, since reflected light varies where
+/// direct light does not.
+Mesh base_mesh(const Scene&, const Plan&, const ValueSource& source, bool bounces, Threads&);
 
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.

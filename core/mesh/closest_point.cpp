@@ -3,41 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <vector>
+
+#include "core/mesh/box_tree.h"
 
 namespace kiln {
 namespace {
-
-constexpr std::uint32_t kLeafSize = 4;
-
-struct Box {
-  Vec3f low{HUGE_VALF, HUGE_VALF, HUGE_VALF}, high{-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
-
-  void add(const Vec3f& p) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  int longest_axis() const {
-    const Vec3f size = high - low;
-    return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  }
-};
-
-double squared_distance(const Box& box, const Vec3d& p) {
-  double sum = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double out = std::max({double(box.low[axis]) - p[axis], p[axis] - double(box.high[axis]), 0.0});
-    sum += out * out;
-  }
-  return sum;
-}
-
-/// Leaf when count > 0: triangles order[first .. first + count). Else its children are nodes first and first + 1.
-struct Node {
-  Box box;
-  std::uint32_t first = 0, count = 0;
-};
 
 std::array<Vec3d, 3> corners(const Mesh& mesh, std::uint32_t triangle) {
   const Triangle& t = mesh.triangles[triangle];
@@ -95,57 +66,23 @@ Vec3d match_position(const Mesh& mesh, const SurfaceMatch& at) { return interpol
 
 struct ClosestPoint::Tree {
   const Mesh& mesh;
-  std::vector<std::uint32_t> order;
-  std::vector<Node> nodes;
+  BoxTree boxes;
 
-  explicit Tree(const Mesh& m) : mesh(m), order(m.triangles.size()) {
-    std::iota(order.begin(), order.end(), 0U);
-    if (order.empty()) return;
-    nodes.reserve(order.size());
-    nodes.push_back({{}, 0, static_cast<std::uint32_t>(order.size())});
-    for (std::size_t node = 0; node < nodes.size(); ++node) split(node);
-  }
-
-  Vec3f centroid(std::uint32_t triangle) const {
-    const Triangle& t = mesh.triangles[triangle];
-    return (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F;
-  }
-
-  /// Halves a node at the median centroid of its longest axis; equal centroids go by index.
-  void split(std::size_t index) {
-    const std::uint32_t first = nodes[index].first, count = nodes[index].count;
-    Box box, centers;
-    for (std::uint32_t i = first; i < first + count; ++i) {
-      for (const std::uint32_t vertex : mesh.triangles[order[i]]) box.add(mesh.position[vertex]);
-      centers.add(centroid(order[i]));
-    }
-    nodes[index].box = box;
-    if (count <= kLeafSize) return;
-    const auto axis = static_cast<std::size_t>(centers.longest_axis());
-    const std::uint32_t half = count / 2;
-    const auto begin = order.begin() + first;
-    std::nth_element(begin, begin + half, begin + count, [&](std::uint32_t a, std::uint32_t b) {
-      const float ca = centroid(a)[axis], cb = centroid(b)[axis];
-      return ca < cb || (ca == cb && a < b);
-    });
-    nodes[index].first = static_cast<std::uint32_t>(nodes.size());
-    nodes[index].count = 0;
-    nodes.push_back({{}, first, half});
-    nodes.push_back({{}, first + half, count - half});
-  }
+  explicit Tree(const Mesh& m) : mesh(m), boxes(m) {}
 
   /// Calls visit(triangle) for every triangle whose box is within sqrt(limit), near boxes first; visit may lower limit.
   template <class Visit>
   void within(const Vec3d& point, double& limit, const Visit& visit) const {
+    const std::vector<BoxTree::Node>& nodes = boxes.nodes;
     if (nodes.empty()) return;
-    std::array<std::uint32_t, 128> stack;  // two for each level; a median split has at most 32 levels
+    std::array<std::uint32_t, BoxTree::kMostOpen> stack;
     std::size_t top = 0;
     stack[top++] = 0;
     while (top > 0) {
-      const Node& node = nodes[stack[--top]];
+      const BoxTree::Node& node = nodes[stack[--top]];
       if (squared_distance(node.box, point) > limit) continue;
       if (node.count > 0) {
-        for (std::uint32_t i = node.first; i < node.first + node.count; ++i) visit(order[i]);
+        for (std::uint32_t i = node.first; i < node.first + node.count; ++i) visit(boxes.order[i]);
         continue;
       }
       const bool first_is_near =

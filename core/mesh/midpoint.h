@@ -1,5 +1,5 @@
 #pragma once
-// Vertices along an edge.
+// Vertices along an edge, or inside a triangle.
 
 #include <cstdint>
 
@@ -19,5 +19,8 @@ std::uint32_t append_midpoint(Mesh&, std::uint32_t a, std::uint32_t b);
 
 /// The same at `share` of the way from a to b. The position is the same bits for vertices at the places of a and b.
 std::uint32_t append_between(Mesh&, std::uint32_t a, std::uint32_t b, float share);
+
+/// The same inside a triangle: (1 - u - v), u and v are the weights of its corners.
+std::uint32_t append_inside(Mesh&, const Triangle& corner, float u, float v);
 
 }  // namespace kiln

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "core/mesh/topology.h"
-#include "core/prt/pierce.h"
 #include "core/prt/ray_origin.h"
 
 namespace kiln {
@@ -61,7 +60,7 @@ struct Crossing {
 };
 
 TransferPoint point_between(const Mesh& mesh, const Crossing& edge, float share) {
-  return between(mesh, mesh.triangles[edge.triangle], edge.seen, edge.hidden, share);
+  return edge_point(mesh, mesh.triangles[edge.triangle], edge.seen, edge.hidden, share);
 }
 
 struct Candidate {
@@ -121,14 +120,10 @@ HiddenTest hidden_test(const Tracer& tracer) {
   return [&tracer, directions = hemisphere()](const TransferPoint& p) { return is_hidden(tracer, directions, p); };
 }
 
-std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<StandIn>& known, const std::vector<bool>& dark,
-                                    const HiddenTest& test, Threads& threads) {
+std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& dark, const HiddenTest& test,
+                                    Threads& threads) {
   const std::vector<std::uint32_t> face = widest_faces(mesh);
-  const auto point_of = [&](std::size_t i) {
-    const auto v = static_cast<std::uint32_t>(i);
-    const auto at = std::ranges::lower_bound(known, v, {}, &StandIn::vertex);
-    return at != known.end() && at->vertex == v ? at->point : vertex_point(mesh, v, face[v]);
-  };
+  const auto point_of = [&](std::size_t i) { return vertex_point(mesh, static_cast<std::uint32_t>(i), face[i]); };
   const std::vector<bool> hidden = test_all(mesh.position.size(), point_of, test, threads);
   std::vector<Candidate> found = from_crossings(mesh, hidden, test, threads);
   if (!dark.empty()) {
@@ -136,9 +131,6 @@ std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<StandIn>
       if (dark[a] && !hidden[a] && !dark[b]) found.push_back({{a, point_of(a)}, 0});
     });
   }
-  std::erase_if(found, [&](const Candidate& c) {
-    return std::ranges::binary_search(known, c.stand_in.vertex, {}, &StandIn::vertex);
-  });
   std::ranges::stable_sort(found, [](const Candidate& a, const Candidate& b) {
     return a.stand_in.vertex != b.stand_in.vertex ? a.stand_in.vertex < b.stand_in.vertex : a.distance < b.distance;
   });

@@ -11,11 +11,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <utility>
 #include <vector>
 
 #include "core/base/threads.h"
 #include "core/mesh/mesh.h"
+#include "core/mesh/part_vertices.h"
 #include "core/prt/transfer_point.h"
 #include "core/trace/tracer.h"
 
@@ -33,14 +33,10 @@ struct StandIn {
 };
 
 /// A stand-in for each hidden vertex that shares an edge with one that is not: of several such edges the place nearest
-/// to the vertex counts. Vertices and stand-ins ascend. `known` vertices have their own points and are not found again.
-/// `dark` has a flag for each vertex without any light, or is empty. On a contact line the sample of a vertex may have
-/// leant to the hidden side and the vertex itself (vertex_points) not: then it stands in for itself.
-std::vector<StandIn> find_stand_ins(const Mesh&, const std::vector<StandIn>& known, const std::vector<bool>& dark,
-                                    const HiddenTest&, Threads&);
-
-/// An edge of the mesh: two vertices, the lower first.
-using MeshEdge = std::pair<std::uint32_t, std::uint32_t>;
+/// to the vertex counts. Vertices ascend. `dark` has a flag for each vertex without any light, or is empty. On a
+/// contact line the sample of a vertex may have leant to the hidden side and the vertex itself (vertex_points) not:
+/// then it stands in for itself.
+std::vector<StandIn> find_stand_ins(const Mesh&, const std::vector<bool>& dark, const HiddenTest&, Threads&);
 
 /// Which of some edges (ascending) have a middle that is hidden on one of their faces.
 std::vector<bool> hidden_middles(const Mesh&, const std::vector<MeshEdge>&, const HiddenTest&, Threads&);

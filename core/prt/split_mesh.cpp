@@ -85,13 +85,11 @@ std::uint32_t SplitMesh::middle_at(const SplitLeaf& leaf, std::uint32_t a, std::
   return fresh;
 }
 
+/// The same bits whichever way round the edge is asked for.
 void SplitMesh::add_new_point(const SplitLeaf& leaf, std::uint32_t a, std::uint32_t b) {
-  const Vec3f normal = middle_normal(mesh_, a, b);
-  const auto& [p, q, r] = leaf.corner;
-  new_points_.push_back({.position = middle(mesh_.position[a], mesh_.position[b]),
-                         .normal = normal,
-                         .inward = (mesh_.position[p] + mesh_.position[q] + mesh_.position[r]) / 3.0F,
-                         .face_normal = normalized(area_vector(mesh_, leaf.corner), normal)});
+  new_points_.push_back(edge_point(mesh_, leaf.corner, std::min(a, b), std::max(a, b), 0.5F));
+  new_points_.back().position = middle(mesh_.position[a], mesh_.position[b]);
+  new_points_.back().normal = middle_normal(mesh_, a, b);
 }
 
 std::uint32_t SplitMesh::middle_point(const SplitLeaf& leaf, std::uint32_t a, std::uint32_t b) {

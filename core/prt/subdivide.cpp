@@ -8,12 +8,10 @@
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
-#include "core/prt/cut_pierced.h"
 #include "core/prt/fit_vertices.h"
 #include "core/prt/row_store.h"
 #include "core/prt/split_measure.h"
 #include "core/prt/split_mesh.h"
-#include "core/prt/straddlers.h"
 
 namespace kiln {
 namespace {
@@ -21,9 +19,6 @@ namespace {
 // A round splits every queued triangle whose error is at least this fraction of the largest. The error of a child is
 // about half its parent's or less, so a round takes what the strict queue would take next, and fills a batch.
 constexpr float kRound = 0.6F;
-
-// Of the residual of a triangle that a straight contact line crosses: the cut takes the rest, if there is room for it.
-constexpr float kPierced = 0.02F;
 
 struct Candidate {
   float error;
@@ -48,7 +43,6 @@ class Subdivider {
         rows_(source.width),
         source_(source),
         params_(params),
-        input_triangles_(input.triangles.size()),
         batch_(kBatch * static_cast<std::size_t>(threads.count())) {
     const std::vector<TransferPoint> points = vertex_points(input);
     for (std::size_t i = 0; i < points.size(); i += batch_) {
@@ -59,7 +53,7 @@ class Subdivider {
   // Figure 2 of the paper, in rounds.
   void run(Threads& threads) {
     queue_new_leaves(threads);
-    while (mesh_->closed_triangles() < room() && !queue_.empty()) {
+    while (mesh_->closed_triangles() < params_.triangles && !queue_.empty()) {
       split_round();
       queue_new_leaves(threads);
     }
@@ -70,7 +64,7 @@ class Subdivider {
     evaluate(mesh_->take_new_points());
     mesh_.reset();  // its tables are not wanted any more; the fit needs the room
     Subdivided result;
-    result.stand_ins = stand_in(closed, cut(closed, threads), threads);
+    result.stand_ins = stand_in(closed, threads);
     if (params_.measure == SplitMeasure::residual) {
       result.values = fit_vertices(closed, std::move(rows_), source_.bounded, threads);
     } else {
@@ -86,30 +80,15 @@ class Subdivider {
   }
 
  private:
-  /// Cuts along contact lines; the new vertices, without rows yet.
-  std::vector<StandIn> cut(ClosedMesh& closed, Threads& threads) {
-    if (!source_.pierced) return {};
-    const auto contrast = [&](std::uint32_t a, std::uint32_t b) {
-      return difference(closed.point[a], closed.point[b]);
-    };
-    std::vector<StandIn> found = cut_pierced(closed, source_.pierced, contrast, params_.triangles, threads);
-    if (source_.hidden) light_straddlers(closed.mesh, found, source_.hidden, threads);
-    closed.point.resize(closed.mesh.position.size());
-    give_rows(found, closed);
-    return found;
-  }
-
   /// Gives hidden vertices the rows of their stand-ins, and takes back what hidden middles said.
-  std::vector<StandIn> stand_in(ClosedMesh& closed, std::vector<StandIn> known, Threads& threads) {
-    if (!source_.hidden) return known;
+  std::vector<StandIn> stand_in(ClosedMesh& closed, Threads& threads) {
+    if (!source_.hidden) return {};
     std::vector<bool> dark;
     for (const std::uint32_t point : closed.point) dark.push_back(is_dark(point));
-    std::vector<StandIn> found = find_stand_ins(closed.mesh, known, dark, source_.hidden, threads);
+    std::vector<StandIn> found = find_stand_ins(closed.mesh, dark, source_.hidden, threads);
     give_rows(found, closed);
     drop_hidden_middles(closed, threads);
-    known.insert(known.end(), found.begin(), found.end());
-    std::ranges::sort(known, {}, &StandIn::vertex);
-    return known;
+    return found;
   }
 
   void give_rows(const std::vector<StandIn>& stand_ins, ClosedMesh& closed) {
@@ -138,17 +117,6 @@ class Subdivider {
     });
   }
 
-  float difference(std::uint32_t a, std::uint32_t b) const {
-    std::array<float, RowStore::kFour> x{}, y{};
-    double sum = 0;
-    for (std::size_t four = 0; four < rows_.fours(); ++four) {
-      rows_.load_four(a, four, x.data());
-      rows_.load_four(b, four, y.data());
-      for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - y[i]) * (x[i] - y[i]);
-    }
-    return static_cast<float>(std::sqrt(sum));
-  }
-
   bool is_dark(std::uint32_t point) const {
     std::array<float, RowStore::kFour> y{};
     for (std::size_t four = 0; four < rows_.fours(); ++four) {
@@ -170,37 +138,15 @@ class Subdivider {
 
   void split_round() {
     const float least = kRound * queue_.top().error;
-    while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < room()) {
+    while (!queue_.empty() && queue_.top().error >= least && mesh_->closed_triangles() < params_.triangles) {
       const std::uint32_t leaf = queue_.top().leaf;
       queue_.pop();
-      if (!mesh_->split(leaf, room())) {
+      if (!mesh_->split(leaf, params_.triangles)) {
         if (++refused_ == kMostRefused) queue_ = {};
         continue;
       }
       refused_ = 0;
-      cuts_ -= pierced_[leaf].cuts;
-      cuts_to_come_ += 3 * std::uint64_t{pierced_[leaf].cuts};  // of its children, until they are counted
     }
-  }
-
-  /// Triangles that cuts would make. Edges that are closed for their neighbours count more than once: a quarter more.
-  std::uint64_t cut_triangles() const { return (cuts_ + cuts_to_come_) * 5 / 4; }
-
-  /// They get at most a quarter of the new triangles,
-  std::uint64_t most_cut_triangles() const { return (params_.triangles - input_triangles_) / 4; }
-
-  /// and leave the rest of the budget.
-  std::uint64_t room() const { return params_.triangles - std::min(most_cut_triangles(), cut_triangles()); }
-
-  /// Counts the pierced edges of leaves that came.
-  void count_cuts(const std::vector<std::uint32_t>& fresh, Threads& threads) {
-    pierced_.resize(mesh_->leaves().size());
-    if (!source_.pierced) return;
-    threads.for_blocks(fresh.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        pierced_[fresh[i]] = pierced_triangle(mesh_->mesh(), mesh_->leaves()[fresh[i]].corner, source_.pierced);
-    });
-    for (const std::uint32_t leaf : fresh) cuts_ += pierced_[leaf].cuts;
   }
 
   // Estimates the error of every leaf that came since the last call and queues those above the threshold.
@@ -212,14 +158,12 @@ class Subdivider {
       for (; seen_leaves_ < end && fresh.size() < batch_; ++seen_leaves_) {
         if (mesh_->leaves()[seen_leaves_].depth < params_.max_depth) fresh.push_back(seen_leaves_);
       }
-      count_cuts(fresh, threads);
       const std::vector<float> error =
           params_.measure == SplitMeasure::residual ? residuals(fresh, threads) : edge_errors(fresh, threads);
       for (std::size_t i = 0; i < fresh.size(); ++i) {
         if (error[i] > params_.threshold && error[i] > 0) queue_.push({coarse(error[i]), fresh[i]});
       }
     }
-    cuts_to_come_ = 0;
   }
 
   /// Rows of some points, unpacked: the columns of `points` one after the other.
@@ -269,7 +213,6 @@ class Subdivider {
     RowStore inner(rows_.width());  // rounded as the others are: a constant has no residual
     inner.append(call_source(centroid, true));
 
-    const bool cuts_fit = 2 * cut_triangles() < most_cut_triangles();
     std::vector<float> error(leaves.size());
     threads.for_blocks(leaves.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       std::vector<float> room, middle(rows_.width());
@@ -278,7 +221,6 @@ class Subdivider {
         inner.load(i, middle.data());
         error[i] = residual_measure({a, b, c}, {ab, bc, ca}, middle,
                                     triangle_area(mesh_->mesh(), mesh_->leaves()[leaves[i]].corner));
-        if (cuts_fit && pierced_[leaves[i]].straight) error[i] *= kPierced;
       }
     });
     return error;
@@ -303,13 +245,9 @@ class Subdivider {
   RowStore rows_;  // of every point of mesh_
   const ValueSource& source_;
   const Subdivide& params_;
-  std::uint64_t input_triangles_;
   std::size_t batch_;
   std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
-  std::vector<PiercedTriangle> pierced_;  // of each leaf
-  std::uint64_t cuts_ = 0;                // pierced edges of all living leaves
-  std::uint64_t cuts_to_come_ = 0;
   int refused_ = 0;
   std::uint64_t evaluated_ = 0;
 };
@@ -325,7 +263,7 @@ Subdivided sample_vertices(const Mesh& input, const ValueSource& source, Threads
   out.values = evaluate(points);
   if (!source.hidden) return out;
 
-  out.stand_ins = find_stand_ins(input, {}, {}, source.hidden, threads);
+  out.stand_ins = find_stand_ins(input, {}, source.hidden, threads);
   std::vector<TransferPoint> moved;
   for (const StandIn& s : out.stand_ins) moved.push_back(s.point);
   const std::vector<float> values = evaluate(moved);

@@ -3,8 +3,7 @@
 // Paper   Krivanek, Pattanaik, Zara 2004: figure 2 (loop), figure 3 (splits), eqs. 2-4 (measures).
 // Beyond  `residual` knows values halfway along the edges; they make the vertices better (fit_vertices.h).
 // Memory  at order 6 about 600 bytes a final vertex besides the mesh: rows of vertices and edge middles (row_store.h)
-// Contact triangles that another surface pierces are cut there (cut_pierced.h); a vertex inside a solid that still is
-//         beside a seen one stands for the last place that is seen (hidden.h)
+// Hidden  a vertex inside a solid that is beside a seen one stands for the last place that is seen (hidden.h)
 // Error   rows are kept in 16 bits: 2^-13 of the largest of four neighbouring columns
 
 #include <cstdint>
@@ -15,7 +14,6 @@
 #include "core/base/threads.h"
 #include "core/mesh/mesh.h"
 #include "core/prt/hidden.h"
-#include "core/prt/pierce.h"
 #include "core/prt/transfer_point.h"
 
 namespace kiln {
@@ -37,7 +35,7 @@ struct Subdivided {
   std::vector<float> values;        // values[v * width + i] for its vertices; as sampled, or fitted (residual)
   std::vector<std::uint8_t> depth;  // of each triangle: how often its input triangle was split
   std::uint64_t evaluated = 0;      // points at which the source was called; each point once
-  std::vector<StandIn> stand_ins;   // of cut and hidden vertices, where their values are from; ascending
+  std::vector<StandIn> stand_ins;   // of hidden vertices, where their values are from; ascending
 };
 
 /// What is wanted at points: a transfer vector, and the light of lamps.
@@ -47,7 +45,6 @@ struct ValueSource {
   std::function<std::vector<float>(std::span<const TransferPoint>)> values;
   std::vector<std::size_t> bounded = {};  // columns that no vertex may have outside the range sampled around it
   HiddenTest hidden = {};                 // none: everything is seen
-  PierceTest pierced = {};                // none: no surface meets another
   /// The same, rougher: for points that only tell where to split. None: `values`.
   std::function<std::vector<float>(std::span<const TransferPoint>)> rough = {};
 };

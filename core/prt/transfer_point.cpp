@@ -12,6 +12,13 @@ float angle_at(const Mesh& mesh, const Triangle& t, std::size_t k) {
   return std::atan2(length(cross(a, b)), dot(a, b));
 }
 
+/// Halfway from corner k to the other side of the triangle.
+Vec3f along_bisector(const Mesh& mesh, const Triangle& t, std::size_t k) {
+  const Vec3f at = mesh.position[t[k]], a = mesh.position[t[(k + 1) % 3]] - at, b = mesh.position[t[(k + 2) % 3]] - at;
+  const float to_a = length(a), to_b = length(b);
+  return at + (a * to_b + b * to_a) / (2 * (to_a + to_b));
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> widest_faces(const Mesh& mesh) {
@@ -34,8 +41,28 @@ TransferPoint vertex_point(const Mesh& mesh, std::uint32_t vertex, std::uint32_t
   TransferPoint point{mesh.position[vertex], mesh.normal[vertex], mesh.position[vertex], mesh.normal[vertex]};
   if (face == kNoFace) return point;
   const Triangle& t = mesh.triangles[face];
-  point.inward = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F;
+  point.inward = along_bisector(mesh, t, t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2);
   point.face_normal = normalized(area_vector(mesh, t), mesh.normal[vertex]);
+  return point;
+}
+
+TransferPoint edge_point(const Mesh& mesh, const Triangle& face, std::uint32_t a, std::uint32_t b, float share) {
+  const Vec3f from = mesh.position[a], way = mesh.position[b] - from, at = from + way * share;
+  const Vec3f normal = normalized(mesh.normal[a] * (1 - share) + mesh.normal[b] * share, mesh.normal[a]);
+  TransferPoint point{at, normal, at, normalized(area_vector(mesh, face), normal)};
+
+  // The corner farthest from the edge's line, and its foot there as a share of the way: the edge may be part of a side.
+  float foot = 0;
+  Vec3f away{};
+  for (const std::uint32_t corner : face) {
+    const Vec3f to_corner = mesh.position[corner] - from;
+    const float along = dot(to_corner, way) / dot(way, way);
+    const Vec3f off = to_corner - way * along;
+    if (dot(off, off) > dot(away, away)) away = off, foot = along;
+  }
+  // Straight away from the edge until the side that the apex leans from.
+  const float reach = foot > share ? share / foot : (1 - share) / (1 - foot);
+  if (is_finite(away) && std::isfinite(reach)) point.inward = at + away * (0.5F * reach);
   return point;
 }
 

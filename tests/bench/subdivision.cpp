@@ -177,7 +177,6 @@ void run(Bench& bench, std::size_t points, Threads& threads) {
   const double start = process_seconds();
   ValueSource as_baked = source;
   as_baked.hidden = hidden_test(tracer);
-  as_baked.pierced = pierce_test(tracer);
   report(bench, "residual, cut", bench.adaptive,
          subdivide(bench.scene.mesh, as_baked, {.triangles = bench.adaptive}, threads), process_seconds() - start);
 }

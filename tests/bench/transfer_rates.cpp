@@ -263,8 +263,7 @@ void bench_subdivision_memory(const std::string& name, const Scene& scene, Threa
   const ValueSource source{.width = kBands,
                            .values = [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); },
                            .bounded = {0},
-                           .hidden = hidden_test(tracer),
-                           .pierced = pierce_test(tracer)};
+                           .hidden = hidden_test(tracer)};
   const std::size_t before = held_bytes;
   peak_bytes = before;
   const Subdivided fine = subdivide(scene.mesh, source, {.triangles = 2 * scene.mesh.triangles.size()}, threads);

@@ -199,7 +199,7 @@ TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
 
 TEST(Promise, ABakeThatWasCutOffGoesOnAndEndsWithTheSameBytes) {
   Threads threads;
-  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.08})"));
+  const BakeInput input = input_of("column", recipe_for(R"({"target_error":0.02})"));
   std::vector<std::string> saved;
   const auto save = [&](const std::string& text) { saved.push_back(text); };
   const auto whole = bake(input, {}, threads, {{}, save});

@@ -59,7 +59,7 @@ TEST(Hidden, StandInsAreTheLastPlacesSeenOnTheirEdges) {
   const Scene scene = box_on_floor(11, false);  // no row of vertices on the contact line
   const Tracer tracer(scene, threads);
   const HiddenTest hidden = hidden_test(tracer);
-  const std::vector<StandIn> found = find_stand_ins(scene.mesh, {}, {}, hidden, threads);
+  const std::vector<StandIn> found = find_stand_ins(scene.mesh, {}, hidden, threads);
   ASSERT_FALSE(found.empty());
   for (const StandIn& s : found) {
     const Vec3f& vertex = scene.mesh.position[s.vertex];

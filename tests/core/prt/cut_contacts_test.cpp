@@ -1,3 +1,5 @@
+#include "core/prt/cut_contacts.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
-#include "core/prt/cut_pierced.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/subdivide.h"
 #include "tests/core/prt/test_scenes.h"
@@ -32,9 +33,9 @@ Subdivided refine(const Scene& scene, std::uint64_t triangles, bool cut, Threads
   const ValueSource source{.width = 1,
                            .values = [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); },
                            .bounded = {0},
-                           .hidden = hidden_test(tracer),
-                           .pierced = cut ? pierce_test(tracer) : PierceTest{}};
-  return subdivide(scene.mesh, source, {.triangles = triangles}, threads);
+                           .hidden = hidden_test(tracer)};
+  const Mesh base = cut ? cut_where_light_jumps(scene, source, triangles, threads) : scene.mesh;
+  return subdivide(base, source, {.triangles = triangles}, threads);
 }
 
 TransferPoint floor_point(float x, float z) { return {{x, 0, z}, {0, 1, 0}, {x, 0, z}, {0, 1, 0}}; }
@@ -72,7 +73,7 @@ double error_at_the_foot(int cells, bool double_sided, bool cut) {
 
 // What is left is noise of 1024 rays (.02 of a half-open point) and what a triangle cannot follow at the corners of the
 // box: measured .026 and .042. Without cuts it is .86 or more.
-TEST(Pierce, LightStopsAtTheFootOfABox) {
+TEST(CutContacts, LightStopsAtTheFootOfABox) {
   for (const int cells : {10, 11}) {
     for (const bool double_sided : {false, true}) {
       const double with = error_at_the_foot(cells, double_sided, true);
@@ -106,7 +107,7 @@ std::vector<std::pair<Vec3f, Vec3f>> odd_edges(const Mesh& mesh) {
 bool on_the_rim(const Vec3f& p) { return p.y == 0 && std::max(std::abs(p.x), std::abs(p.z)) == 0.5F; }
 
 // A hanging vertex has three odd edges about it. The rim of the floor is all that is open here.
-TEST(Pierce, CutsLeaveNoCrackAndKeepTheBudget) {
+TEST(CutContacts, CutsLeaveNoCrackAndKeepTheBudget) {
   Threads threads(2);
   for (const int cells : {10, 11}) {
     const Scene scene = box_in_floor(cells, false);
@@ -122,7 +123,7 @@ TEST(Pierce, CutsLeaveNoCrackAndKeepTheBudget) {
   }
 }
 
-TEST(Pierce, AMeshThatNothingPiercesIsLeftAlone) {
+TEST(CutContacts, AMeshThatNothingStandsOnIsLeftAlone) {
   Threads threads(2);
   Scene scene = testing::empty_scene();
   testing::add_sphere(scene, {0, 0, 0}, 0.4F, 24);
@@ -131,7 +132,68 @@ TEST(Pierce, AMeshThatNothingPiercesIsLeftAlone) {
   EXPECT_EQ(cut.values, plain.values);
 }
 
-TEST(Pierce, SameBitsForAnyNumberOfThreads) {
+bool faces_up(const Mesh& mesh, const Triangle& t) {
+  return area_vector(mesh, t).y > 0.5F * length(area_vector(mesh, t));
+}
+
+/// Two walls that cross on a floor, each of two triangles and upright, thin as they are: the floor falls into four.
+TEST(CutContacts, CrossedWallsPartTheFloorIntoFour) {
+  Threads threads(1);
+  Scene scene = testing::empty_scene();
+  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
+  testing::add_grid(scene, {-0.6F, 0, 0.1F}, {1.2F, 0, 0}, {0, 0.3F, 0}, 1, 1);
+  testing::add_grid(scene, {0.2F, 0, -0.6F}, {0, 0, 1.2F}, {0, 0.3F, 0}, 1, 1);
+  const auto lines = find_contact_lines(scene.mesh, std::vector<bool>(6, true), threads);
+  const Mesh cut = cut_contacts(scene.mesh, lines, 1000, threads);
+  std::map<std::pair<bool, bool>, double> area;  // of the floor, by side of the walls
+  for (const Triangle& t : cut.triangles) {
+    if (!faces_up(cut, t)) continue;
+    const Vec3f middle = centroid(cut, t);
+    area[{middle.x > 0.2F, middle.z > 0.1F}] += triangle_area(cut, t);
+    for (const std::uint32_t v : t) {  // whole on its side
+      EXPECT_TRUE(middle.x > 0.2F ? cut.position[v].x > 0.2F - 1e-5F : cut.position[v].x < 0.2F + 1e-5F);
+      EXPECT_TRUE(middle.z > 0.1F ? cut.position[v].z > 0.1F - 1e-5F : cut.position[v].z < 0.1F + 1e-5F);
+    }
+  }
+  EXPECT_NEAR((area[{false, false}]), 0.7 * 0.6, 1e-5);
+  EXPECT_NEAR((area[{true, false}]), 0.3 * 0.6, 1e-5);
+  EXPECT_NEAR((area[{false, true}]), 0.7 * 0.4, 1e-5);
+  EXPECT_NEAR((area[{true, true}]), 0.3 * 0.4, 1e-5);
+  // No vertex is shared over a wall.
+  std::map<std::uint32_t, std::pair<bool, bool>> side;
+  for (const Triangle& t : cut.triangles) {
+    if (!faces_up(cut, t)) continue;
+    const Vec3f middle = centroid(cut, t);
+    const std::pair<bool, bool> mine{middle.x > 0.2F, middle.z > 0.1F};
+    for (const std::uint32_t v : t) EXPECT_EQ(side.try_emplace(v, mine).first->second, mine);
+  }
+}
+
+/// A line that ends inside a face leaves the surface whole around its end.
+TEST(CutContacts, AWallThatEndsInsideAFloorSharesTheVertexAtItsEnd) {
+  Threads threads(1);
+  Scene scene = testing::empty_scene();
+  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
+  testing::add_grid(scene, {-0.6F, 0, 0.1F}, {0.8F, 0, 0}, {0, 0.3F, 0}, 1, 1);
+  const auto lines = find_contact_lines(scene.mesh, std::vector<bool>(4, true), threads);
+  const Mesh cut = cut_contacts(scene.mesh, lines, 1000, threads);
+  std::map<float, int> copies;  // of the places on the line, by x
+  for (const Vec3f& p : cut.position) {
+    if (p.y == 0 && std::abs(p.z - 0.1F) < 1e-5F) ++copies[std::round(p.x * 1000) / 1000];
+  }
+  EXPECT_EQ(copies[-0.5F], 3);  // one of the floor on either side; the wall's lower edge has the place as well
+  EXPECT_EQ(copies[0.2F], 2);   // one of the floor, one of the wall
+}
+
+TEST(CutContacts, TilesThatOverlapInOnePlaneMakeNoLines) {
+  Threads threads(1);
+  Scene scene = testing::empty_scene();
+  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
+  testing::add_grid(scene, {-0.25F, 1e-6F, 0.25F}, {0.5F, 1e-5F, 0}, {0, 0, -0.5F}, 1, 1);
+  EXPECT_TRUE(find_contact_lines(scene.mesh, std::vector<bool>(4, true), threads).empty());
+}
+
+TEST(CutContacts, SameBitsForAnyNumberOfThreads) {
   Threads one(1), two(2);
   const Scene scene = box_in_floor(11, true);
   const Subdivided a = refine(scene, 2000, true, one), b = refine(scene, 2000, true, two);
