@@ -13,6 +13,15 @@
 namespace kiln {
 namespace {
 
+/// The nearest folder that is there already, on the disk that the result goes to.
+std::string spill_folder(const std::string& output) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path folder = fs::absolute(output, error);
+  while (!fs::is_directory(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  return folder.string();
+}
+
 Outcome<BakeInput> bake_input(const std::string& path, const RecipeOptions& options) {
   KILN_TRY(loaded, load_recipe(options, false));
   KILN_TRY(recipe, checked_recipe(loaded));
@@ -53,6 +62,7 @@ Outcome<ExitCode> run(const BakeOptions& options, Session& session) {
   const std::string folder = output_folder(options.output, options.input);
   if (const Outcome<void> usable = check_folder(folder); !usable) return tl::make_unexpected(usable.error());
   KILN_TRY(input, bake_input(options.input, options.recipe));
+  input.spill_folder = spill_folder(folder);
   KILN_TRY(output, bake_here(input, session));
   KILN_TRY(files, write_artifacts(output, folder));
   return show_bake(files, options.max_error, session);

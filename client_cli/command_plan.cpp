@@ -1,4 +1,6 @@
 // kiln plan IN: what a bake would model and what it would skip, and why; nothing is baked.
+#include <filesystem>
+
 #include "client_cli/commands.h"
 #include "client_cli/files.h"
 #include "client_cli/models.h"
@@ -9,13 +11,19 @@
 namespace kiln {
 namespace {
 
+std::string temporary_folder() {
+  std::error_code error;
+  return std::filesystem::temp_directory_path(error).string();
+}
+
 Outcome<std::string> plan_here(const PlanOptions& options, Session& session) {
   KILN_TRY(loaded, load_recipe(options.recipe, false));
   KILN_TRY(recipe, checked_recipe(loaded));
   KILN_TRY(files, load_files(options.input));
   Threads threads(recipe.limits.threads);
   const StopTogether together(session.interrupt, threads);
-  return or_failure(plan_json({std::move(files), recipe, loaded.environment, loaded.environment_name}, threads));
+  return or_failure(
+      plan_json({std::move(files), recipe, loaded.environment, loaded.environment_name, temporary_folder()}, threads));
 }
 
 Outcome<std::string> plan_there(const PlanOptions& options, Session& session) {

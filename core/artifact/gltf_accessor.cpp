@@ -108,4 +108,38 @@ std::vector<std::uint32_t> read_indices(const AccessorSource& source, int access
   return out;
 }
 
+AccessorReader::AccessorReader(const AccessorSource& source, int accessor, const std::string& place, Findings& findings)
+    : count_(at(source, accessor).count), width_(at(source, accessor).width) {
+  const Accessor& a = at(source, accessor);
+  if (a.matrix) findings.fail("accessor_type", "Matrices are not expected here.", place);
+  if (a.matrix) return;
+  if (a.view < 0 || a.sparse.count > 0) {
+    if (a.width == 1) held_indices_ = read_indices(source, accessor, place, findings);
+    held_ = read_floats(source, accessor, place, findings);
+    return;
+  }
+  base_ = source.bytes.views[static_cast<std::size_t>(a.view)].data() + a.offset;
+  stride_ = stride_of(a, source.document);
+  component_ = a.component;
+  normalized_ = a.normalized;
+}
+
+void AccessorReader::floats(std::uint64_t element, float* out) const {
+  if (!base_) {
+    std::copy_n(held_.begin() + static_cast<std::ptrdiff_t>(element * width_), width_, out);
+    return;
+  }
+  const std::uint8_t* from = base_ + element * stride_;
+  const std::uint64_t size = component_bytes(component_);
+  for (std::uint64_t c = 0; c < width_; ++c) out[c] = load_float(from + c * size, component_, normalized_);
+}
+
+std::uint32_t AccessorReader::index(std::uint64_t element) const {
+  return base_ ? load_unsigned(base_ + element * stride_, component_) : held_indices_[element];
+}
+
+const std::uint8_t* AccessorReader::address(std::uint64_t element) const {
+  return base_ ? base_ + element * stride_ : nullptr;
+}
+
 }  // namespace kiln::gltf

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/file_bytes.h"
 #include "core/base/result.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
@@ -19,7 +20,7 @@ using Bytes = std::vector<std::uint8_t>;
 /// The files of one upload. The main file may name others by relative URI; only names in `resources` are ever read.
 struct SceneFiles {
   std::string name;                        // of the main file; for error places only
-  Bytes main;                              // .glb, .gltf or .ply, told apart by content
+  FileBytes main;                          // .glb, .gltf or .ply, told apart by content
   std::map<std::string, Bytes> resources;  // by URI as written in the glTF after percent-decoding
 };
 

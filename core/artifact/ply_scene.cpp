@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/artifact/assemble.h"
-#include "core/artifact/ply_reader.h"
+#include "core/artifact/ply_columns.h"
 #include "core/artifact/raw_part.h"
 
 namespace kiln {
@@ -13,61 +12,24 @@ namespace {
 
 using Span = std::span<const std::uint8_t>;
 
-/// Where each property that a bake uses stands in a row of a vertex; -1 if absent.
-struct Columns {
-  int position[3], normal[3], color[3], alpha, uv[2];
-  bool color_is_bytes = false;
-};
-
-Columns columns_of(const PlyElement& vertex) {
-  std::map<std::string, int> at;
-  for (std::size_t i = 0; i < vertex.properties.size(); ++i) at.emplace(vertex.properties[i].name, static_cast<int>(i));
-  const auto column = [&](std::initializer_list<const char*> names) {
-    for (const char* name : names) {
-      if (at.contains(name)) return at[name];
-    }
-    return -1;
-  };
-  Columns c{.position = {column({"x"}), column({"y"}), column({"z"})},
-            .normal = {column({"nx"}), column({"ny"}), column({"nz"})},
-            .color = {column({"red", "r", "diffuse_red"}), column({"green", "g", "diffuse_green"}),
-                      column({"blue", "b", "diffuse_blue"})},
-            .alpha = column({"alpha", "a"}),
-            .uv = {column({"u", "s", "texture_u"}), column({"v", "t", "texture_v"})}};
-  if (c.color[0] >= 0) c.color_is_bytes = vertex.properties[static_cast<std::size_t>(c.color[0])].type == PlyType::u8;
-  return c;
-}
-
-float srgb_to_linear(double s) {
-  return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
-}
-
-template <std::size_t N>
-bool present(const int (&columns)[N]) {
-  return std::all_of(std::begin(columns), std::end(columns), [](int c) { return c >= 0; });
-}
-
 Vec3f pick3(const std::vector<double>& row, const int (&c)[3]) {
   const auto at = [&](int i) { return static_cast<float>(row[static_cast<std::size_t>(c[i])]); };
   return {at(0), at(1), at(2)};
 }
 
-Vec4f pick_color(const std::vector<double>& row, const Columns& c) {
+Vec4f pick_color(const std::vector<double>& row, const PlyColumns& c) {
   const double unit = c.color_is_bytes ? 1 / 255.0 : 1;
-  const auto at = [&](int column) { return std::clamp(row[static_cast<std::size_t>(column)] * unit, 0.0, 1.0); };
-  const auto linear = [&](int column) {
-    return c.color_is_bytes ? srgb_to_linear(at(column)) : static_cast<float>(at(column));
-  };
+  const auto linear = [&](int column) { return ply_color(c, row[static_cast<std::size_t>(column)]); };
   return {linear(c.color[0]), linear(c.color[1]), linear(c.color[2]),
-          c.alpha < 0 ? 1.0F : static_cast<float>(at(c.alpha))};
+          c.alpha < 0 ? 1.0F : static_cast<float>(std::clamp(row[static_cast<std::size_t>(c.alpha)] * unit, 0.0, 1.0))};
 }
 
 /// v runs upwards in PLY files that have it, downwards in glTF.
-void take_vertex(const std::vector<double>& row, const Columns& c, RawPart& part) {
+void take_vertex(const std::vector<double>& row, const PlyColumns& c, RawPart& part) {
   part.position.push_back(pick3(row, c.position));
-  if (present(c.normal)) part.normal.push_back(pick3(row, c.normal));
-  if (present(c.color)) part.color.push_back(pick_color(row, c));
-  if (present(c.uv)) {
+  if (c.has_normal()) part.normal.push_back(pick3(row, c.normal));
+  if (c.has_color()) part.color.push_back(pick_color(row, c));
+  if (c.has_uv()) {
     part.uv0.push_back({static_cast<float>(row[static_cast<std::size_t>(c.uv[0])]),
                         1 - static_cast<float>(row[static_cast<std::size_t>(c.uv[1])])});
   }
@@ -100,8 +62,8 @@ bool read_property(PlyNumbers& in, const PlyProperty& p, std::vector<double>& va
 
 /// Vertices from line `first` on; rows of the element in file order.
 void read_vertices(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings& findings) {
-  const Columns columns = columns_of(e);
-  if (!present(columns.position)) return findings.fail("ply_invalid", "Vertices have no x, y and z.", "header");
+  const PlyColumns columns = ply_columns(e);
+  if (!columns.has_position()) return findings.fail("ply_invalid", "Vertices have no x, y and z.", "header");
   std::vector<double> row(e.properties.size()), values;
   for (std::uint64_t i = 0; i < e.count; ++i) {
     for (std::size_t p = 0; p < e.properties.size(); ++p) {
@@ -117,16 +79,14 @@ void read_vertices(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings&
 
 void read_faces(PlyNumbers& in, const PlyElement& e, RawPart& part, Findings& findings) {
   std::vector<double> values, corners;
-  const auto is_corners = [](const PlyProperty& p) {
-    return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
-  };
-  if (std::none_of(e.properties.begin(), e.properties.end(), is_corners)) {
+  const auto corner_list = ply_corner_list(e);
+  if (!corner_list) {
     return findings.fail("ply_invalid", "Faces have no list of vertex_indices.", "header");
   }
   for (std::uint64_t i = 0; i < e.count; ++i) {
-    for (const PlyProperty& p : e.properties) {
-      if (!read_property(in, p, values)) return fail_truncated(e, i, findings);
-      if (is_corners(p)) corners = values;
+    for (std::size_t p = 0; p < e.properties.size(); ++p) {
+      if (!read_property(in, e.properties[p], values)) return fail_truncated(e, i, findings);
+      if (p == *corner_list) corners = values;
     }
     for (const double v : corners) {
       if (v >= 0 && v < static_cast<double>(part.position.size()) && v == std::floor(v)) continue;

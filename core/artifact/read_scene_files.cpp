@@ -67,7 +67,7 @@ Result<SceneFiles> read_scene_files(const std::string& path) {
   const fs::path main(path);
   SceneFiles files;
   files.name = main.filename().string();
-  KILN_TRY(bytes, read_file(main, files.name));
+  KILN_TRY(bytes, FileBytes::map(path, files.name));
   files.main = std::move(bytes);
   const fs::path folder = main.has_parent_path() ? main.parent_path() : fs::path(".");
   for (const std::string& name : named_files(json_of(files))) {

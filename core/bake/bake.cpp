@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/evaluate.h"
@@ -20,10 +19,11 @@
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
 #include "core/bake/progressive.h"
+#include "core/bake/provenance.h"
 #include "core/bake/radiosity_step.h"
+#include "core/bake/reduce_step.h"
 #include "core/bake/report.h"
 #include "core/bake/transport.h"
-#include "core/base/sha256.h"
 
 namespace kiln {
 namespace {
@@ -50,16 +50,6 @@ Result<void> check_memory(const Plan& plan, const Limits& limits) {
                     : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
                                      : "lower /steps/0/subdivide/triangles or /steps/0/order") +
                    ", or raise the limit");
-}
-
-std::string provenance(const BakeInput& input) {
-  const std::string identity = recipe_identity(input.recipe);
-  const auto bytes = std::span(reinterpret_cast<const std::uint8_t*>(identity.data()), identity.size());
-  const nlohmann::ordered_json json = {{"engine", std::string("kiln ") + kEngineVersion},
-                                       {"scene_sha256", sha256_hex(input.scene.main)},
-                                       {"recipe_sha256", sha256_hex(bytes)},
-                                       {"seed", input.recipe.seed}};
-  return json.dump();
 }
 
 /// The baked scene before it is written: transport, the job's light, and an exposure that suits both.
@@ -251,6 +241,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
 
 Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Threads& threads,
                         const Checkpoints& checkpoints) {
+  if (input.recipe.reduce) return bake_reduced(input, progress, threads, checkpoints);
   BakeLog log(progress);
   log.begin("read", 0.05);
   KILN_TRY(scene, read_scene(input));
@@ -303,6 +294,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
 }
 
 Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
+  if (input.recipe.reduce) return reduce_plan_json(input);
   KILN_TRY(scene, read_scene(input));
   KILN_TRY(light, job_light(input));
   const Plan plan = plan_of(scene, input.recipe, light, threads);

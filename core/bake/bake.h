@@ -22,10 +22,12 @@ struct BakeInput {
   Recipe recipe;
   Bytes environment;  // the file the recipe's environment names; empty for constant, built-in or none
   std::string environment_name;
+  std::string made_of;             // JSON for asset.extras.kiln; empty: made from scene and recipe (provenance.h)
+  std::string spill_folder = ".";  // where a reduction puts aside what does not fit into memory
 };
 
-/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png, report.json,
-/// log.txt.
+/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png (not of a
+/// reduction), report.json, log.txt.
 struct ArtifactFile {
   std::string name;
   std::string media_type;

@@ -13,6 +13,7 @@ using nlohmann::json;
 
 constexpr std::int64_t kMaxBudget = 50'000'000;
 constexpr int kMostGridSide = 512;
+constexpr int kLeastMapSide = 64, kMostMapSide = 8192;
 constexpr std::int64_t kMaxExactInteger = 9'007'199'254'740'991;  // 2^53 - 1: what a JSON number holds everywhere
 
 bool is_sha256(const std::string& text) {
@@ -177,19 +178,55 @@ GridStep read_grid(JsonFields& fields) {
   return step;
 }
 
+ReduceStep read_reduce(JsonFields& fields) {
+  ReduceStep step;
+  if (const auto n = fields.integer_or_auto("triangles", 4, kMaxBudget))
+    step.triangles = static_cast<std::uint64_t>(*n);
+  step.ratio = fields.number("ratio", 1e-6, 1);
+  if (step.triangles && step.ratio)
+    fields.error("ratio", "means nothing where triangles are given", "triangles or ratio");
+  constexpr ReduceMethod kMethods[] = {ReduceMethod::cluster, ReduceMethod::adaptive};
+  if (const auto method = fields.word("method", {"cluster", "adaptive"})) step.method = kMethods[*method];
+  const json* map = fields.find("normal_map");
+  if (map && *map == "off") {
+    step.normal_map = 0;
+  } else if (map && *map != "auto") {
+    const bool good = map->is_number_integer() && *map >= kLeastMapSide && *map <= kMostMapSide;
+    if (good) step.normal_map = map->get<int>();
+    if (!good) fields.error("normal_map", "must be auto, off or a whole number from 64 to 8192", "auto, off, texels");
+  }
+  return step;
+}
+
+/// Reads one step into the recipe. Returns whether it is `reduce`.
+bool read_step(const json& value, const std::string& pointer, Recipe& recipe, Errors& errors) {
+  JsonFields fields(value, pointer, errors);
+  if (!fields.find("do", true)) return false;
+  const auto step = fields.word("do", {"prt", "radiosity", "grid", "reduce"});
+  if (!step) return false;
+  if (*step == 0) recipe.steps.push_back(read_prt(fields, pointer, errors));
+  if (*step == 1) recipe.radiosity = read_radiosity(fields, pointer, errors);
+  if (*step == 2) recipe.grid = read_grid(fields);
+  if (*step == 3) recipe.reduce = read_reduce(fields);
+  fields.finish();
+  return *step == 3;
+}
+
 void read_steps(const json& value, Recipe& recipe, Errors& errors) {
-  if (!value.is_array() || value.size() != 1) {
-    errors.push_back({"/steps", "must be a list with one step", shown(value), "[{\"do\": \"prt\"}]"});
+  if (!value.is_array() || value.empty() || value.size() > 2) {
+    errors.push_back({"/steps", "must be a list with one step, or with reduce and one more", shown(value),
+                      "[{\"do\": \"prt\"}], [{\"do\": \"reduce\"}, {\"do\": \"prt\"}]"});
     return;
   }
-  JsonFields fields(value[0], "/steps/0", errors);
-  if (!fields.find("do", true)) return;
-  const auto step = fields.word("do", {"prt", "radiosity", "grid"});
-  if (!step) return;
-  if (*step == 0) recipe.steps.push_back(read_prt(fields, "/steps/0", errors));
-  if (*step == 1) recipe.radiosity = read_radiosity(fields, "/steps/0", errors);
-  if (*step == 2) recipe.grid = read_grid(fields);
-  fields.finish();
+  const std::size_t before = errors.size();
+  const bool first = read_step(value[0], "/steps/0", recipe, errors);
+  if (value.size() == 1) return;
+  const bool second = read_step(value[1], "/steps/1", recipe, errors);
+  if (errors.size() > before) return;
+  if (!first || second) {
+    errors.push_back({"/steps", "only reduce may come before another step, and once", shown(value),
+                      "reduce, then one of prt, radiosity, grid"});
+  }
 }
 
 Promise read_promise(const json& value, Errors& errors) {
@@ -219,6 +256,10 @@ void check_promise(const Recipe& recipe, Errors& errors) {
   if (recipe.radiosity) {
     errors.push_back(
         {"/quality", "cannot be promised of a radiosity step: it is baked in one pass", "", "draft, standard, final"});
+  }
+  if (recipe.reduce && !recipe.bakes_light()) {
+    errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
+                      "draft, standard, final"});
   }
   if (!recipe.certificate)
     errors.push_back({"/certificate", "must not be off: what /quality promises is what it proves", "false", "true"});
@@ -358,6 +399,16 @@ json step_json(const GridStep& step) {
   return out;
 }
 
+json step_json(const ReduceStep& step) {
+  json out = {{"do", "reduce"},
+              {"method", step.method == ReduceMethod::cluster ? "cluster" : "adaptive"},
+              {"normal_map", or_auto(step.normal_map)}};
+  if (step.normal_map && *step.normal_map == 0) out["normal_map"] = "off";
+  if (step.ratio) out["ratio"] = *step.ratio;
+  if (!step.ratio) out["triangles"] = or_auto(step.triangles);
+  return out;
+}
+
 }  // namespace
 
 tl::expected<Recipe, std::vector<FieldError>> parse_recipe(std::string_view text) {
@@ -387,6 +438,7 @@ std::string recipe_json(const Recipe& recipe) {
       {"certificate", recipe.certificate},
       {"label", recipe.label},
       {"steps", json::array()}};
+  if (recipe.reduce) out["steps"].push_back(step_json(*recipe.reduce));
   for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
   if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
   if (recipe.grid) out["steps"].push_back(step_json(*recipe.grid));
@@ -410,6 +462,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"radiosity"}],"environment":{"builtin":"clear"}})"},
       {"grid", "Indirect light in a grid, for what moves in the scene; the scene itself lit as by radiosity",
        R"({"steps":[{"do":"grid"}],"environment":{"builtin":"clear"}})"},
+      {"reduce", "A scan of any size down to a tenth, at most 200,000 triangles, with a normal map",
+       R"({"steps":[{"do":"reduce"}]})"},
       {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},
   };
   return all;

@@ -11,6 +11,7 @@
 
 #include "core/grid/grid.h"
 #include "core/prt/subdivide.h"
+#include "core/reduce/reduce_method.h"
 
 namespace kiln {
 
@@ -75,6 +76,14 @@ struct GridStep {
   std::optional<int> samples;  // rays of a vertex
 };
 
+/// Fewer triangles, and a normal map for what they do not hold (core/reduce/reduce.h).
+struct ReduceStep {
+  std::optional<std::uint64_t> triangles;  // auto when this and `ratio` are absent
+  std::optional<double> ratio;             // of the model's triangles
+  ReduceMethod method = ReduceMethod::adaptive;
+  std::optional<int> normal_map;  // texels along a side; 0: none; auto when absent
+};
+
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"
 
 /// What a bake must reach instead of a quality: the error its certificate proves, the time it may take, or whichever of
@@ -97,6 +106,7 @@ struct Recipe {
   std::vector<PrtStep> steps;              // one, or none where there is a
   std::optional<RadiosityStep> radiosity;  // step `radiosity`
   std::optional<GridStep> grid;            // step `grid`
+  std::optional<ReduceStep> reduce;        // step `reduce`: alone, or before one of the others
   Quality quality = Quality::standard;     // where nothing is promised
   Promise promise;
   std::uint64_t seed = 0;
@@ -104,6 +114,8 @@ struct Recipe {
   bool strict = false;
   bool certificate = true;
   std::string label;
+
+  bool bakes_light() const { return !steps.empty() || radiosity || grid; }
 };
 
 /// Parses and checks a recipe. All mistakes at once.

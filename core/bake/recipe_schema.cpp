@@ -75,6 +75,18 @@ std::string recipe_schema() {
         "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "samples": {"description": "rays of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
+    },
+    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}]},
+    "reduce": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "not": {"required": ["triangles", "ratio"], "properties": {"triangles": {"type": "integer"}}},
+      "properties": {
+        "do": {"enum": ["reduce"]},
+        "triangles": {"description": "of the result, at most; auto: a tenth of the model's, at most 200000", "anyOf": [{"type": "integer", "minimum": 4, "maximum": 50000000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "ratio": {"description": "of the model's triangles, instead of triangles", "type": "number", "minimum": 1e-6, "maximum": 1},
+        "method": {"description": "what a model larger than limits.memory_mb goes through first: cells of one size, or an octree that is fine where the model is curved", "enum": ["cluster", "adaptive"], "default": "adaptive"},
+        "normal_map": {"description": "texels along a side", "anyOf": [{"type": "integer", "minimum": 64, "maximum": 8192}, {"enum": ["auto", "off"]}], "default": "auto"}
+      }
     }
   },
   "properties": {
@@ -92,8 +104,11 @@ std::string recipe_schema() {
       }
     },
     "steps": {
-      "type": "array", "minItems": 1, "maxItems": 1, "default": [{"do": "prt"}],
-      "items": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}]}
+      "type": "array", "minItems": 1, "default": [{"do": "prt"}],
+      "anyOf": [
+        {"maxItems": 1, "items": {"anyOf": [{"$ref": "#/definitions/light"}, {"$ref": "#/definitions/reduce"}]}},
+        {"minItems": 2, "maxItems": 2, "items": [{"$ref": "#/definitions/reduce"}, {"$ref": "#/definitions/light"}]}
+      ]
     },
     "quality": {
       "default": "standard",

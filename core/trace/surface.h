@@ -3,6 +3,7 @@
 
 #include "core/base/vec.h"
 #include "core/scene/scene.h"
+#include "core/scene/texture.h"
 #include "core/trace/tracer.h"
 
 namespace kiln {
@@ -33,9 +34,5 @@ Vec3f emission_at(const Scene&, const SurfacePoint&);
 float opacity_at(const Scene&, const SurfacePoint&);
 /// The coverage from which a surface stops rays.
 inline constexpr float kOpaqueFrom = 0.5F;
-
-/// Bilinear (or nearest) texel fetch with wrapping, as stored: sRGB decoded when `srgb`. White when the pixels are
-/// absent.
-Vec4f sample_texture(const Scene&, const TextureRef&, const Vec2f& uv, bool srgb);
 
 }  // namespace kiln

@@ -56,6 +56,13 @@ Bytes read_file(const std::string& path) {
   return bytes;
 }
 
+/// Blobs never change: they may be mapped.
+FileBytes map_file(const std::string& path) {
+  auto bytes = FileBytes::map(path, "scene");
+  if (!bytes) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
+  return std::move(*bytes);
+}
+
 void write_file(const std::string& path, const void* data, std::size_t size) {
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd < 0) throw WorkerTrouble{{errno == ENOSPC ? "disk_full" : "internal", "the worker could not write", ""}};
@@ -74,10 +81,11 @@ BakeInput read_input(const WorkerOrder& order) {
   auto recipe = parse_recipe(order.recipe);
   if (!recipe) throw WorkerTrouble{{"internal", "the worker did not understand its recipe", ""}};
   BakeInput input;
+  input.spill_folder = "out";  // the only place that the sandbox lets it write to
   input.recipe = std::move(*recipe);
   std::size_t place = 0;
   input.scene.name = order.inputs.scene.name;
-  input.scene.main = read_file(input_path(place));
+  input.scene.main = map_file(input_path(place));
   for (const NamedBlob& file : order.inputs.resources) {
     input.scene.resources[file.name] = read_file(input_path(++place));
   }

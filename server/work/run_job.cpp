@@ -13,6 +13,7 @@
 #include "server/jobs/ids.h"
 #include "server/work/checkpoint_file.h"
 #include "server/work/work_folder.h"
+#include "server/work/worker_protocol.h"
 
 namespace kiln {
 namespace {
@@ -45,6 +46,12 @@ WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const L
   order.require_sandbox = options.require_sandbox;
   order.parent = static_cast<int>(::getpid());
   return order;
+}
+
+std::uint64_t scene_bytes(const WorkFolder& folder) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(folder.path() / input_path(0), error);
+  return error ? 0 : bytes;
 }
 
 /// Progress and heartbeats of one run.
@@ -129,7 +136,8 @@ class JobRun {
   WorkerOutcome bake(const WorkFolder& folder, const Limits& limits) {
     Pulse pulse(claim_, stop_, place_);
     const std::uint64_t memory = limits.memory_mb << 20;
-    return run_worker({place_.options.worker_command, folder.path(), memory}, {memory, limits.wall_s}, stop_,
+    return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder)},
+                      {memory, limits.wall_s}, stop_,
                       {[&](const ProgressEvent& event) { pulse.progress(event); },
                        [&](const std::string& text) { checkpoint_.save(text); }, [&] { pulse.tick(); }});
   }
@@ -261,7 +269,7 @@ Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe,
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
   const std::uint64_t memory = limits.memory_mb << 20;
-  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory},
+  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, scene_bytes(folder)},
                                            {memory, std::min(limits.wall_s, kPlanWallS)}, stop, {});
   if (outcome.kind == Kind::done) return read_text(folder.result("plan.json"));
   if (outcome.kind == Kind::stopped) return fault("draining", "the server stops");

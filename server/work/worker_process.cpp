@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -86,14 +87,15 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 }
 
 /// From outside, so that it holds for every program that may be the worker.
-void limit(pid_t pid, std::uint64_t memory_bytes) {
+void limit(pid_t pid, const WorkerStart& start) {
   const rlimit no_core{0, 0};
   const rlimit files{kMaxFiles, kMaxFiles};
   ::prlimit(pid, RLIMIT_CORE, &no_core, nullptr);
   ::prlimit(pid, RLIMIT_NOFILE, &files, nullptr);
-  if (!kLimitAddressSpace || memory_bytes == 0) return;
+  if (!kLimitAddressSpace || start.memory_bytes == 0) return;
   // Allocators and thread stacks reserve more than they use; resident memory is watched by the supervisor.
-  const rlim_t space = 2 * memory_bytes + (4ULL << 30);
+  // A scene is mapped, and what a reduction puts aside of it may be as large again.
+  const rlim_t space = 2 * start.memory_bytes + 2 * start.mapped_bytes + (4ULL << 30);
   const rlimit address_space{space, space};
   ::prlimit(pid, RLIMIT_AS, &address_space, nullptr);
 }
@@ -121,7 +123,7 @@ Result<WorkerProcess> WorkerProcess::start(const WorkerStart& start) {
     ::close(ends[0]);
     return spawn_fault();
   }
-  limit(pid, start.memory_bytes);
+  limit(pid, start);
   WorkerProcess worker(pid, ends[0], static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
   if (worker.end_ < 0) return spawn_fault();  // the destructor ends it
   ::fcntl(worker.end_, F_SETFD, FD_CLOEXEC);
@@ -179,9 +181,9 @@ void WorkerProcess::signal(int number) const { ::kill(-pid_, number); }
 
 std::uint64_t WorkerProcess::resident_bytes() const {
   std::ifstream file("/proc/" + std::to_string(pid_) + "/statm");
-  std::uint64_t total = 0, resident = 0;
-  file >> total >> resident;
-  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  std::uint64_t total = 0, resident = 0, of_files = 0;
+  file >> total >> resident >> of_files;
+  return (resident - std::min(resident, of_files)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace kiln

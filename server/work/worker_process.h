@@ -17,6 +17,7 @@ struct WorkerStart {
   std::vector<std::string> command;  // empty: this program with kWorkerWord; the folder is added as last argument
   std::filesystem::path folder;      // absolute; becomes its current directory; takes its stderr as worker.log
   std::uint64_t memory_bytes = 0;    // resident memory it may use; address space is limited generously above it
+  std::uint64_t mapped_bytes = 0;    // of the files that it maps, which take address space too
 };
 
 /// Owns the process: the destructor kills and reaps what still runs. The process leads a group of its own.
@@ -37,6 +38,7 @@ class WorkerProcess {
   /// The wait status once it has ended and was reaped.
   std::optional<int> try_wait();
   void signal(int number) const;  // to the whole group
+  /// Memory of its own: pages of files that it maps are the system's.
   std::uint64_t resident_bytes() const;
 
  private:

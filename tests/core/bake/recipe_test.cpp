@@ -128,6 +128,48 @@ TEST(Recipe, OfAGridHasItsOwnParametersAndSurvivesARoundTrip) {
   EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
 }
 
+TEST(Recipe, OfAReductionHasItsOwnParametersAndSurvivesARoundTrip) {
+  for (const char* text :
+       {R"({"steps":[{"do":"reduce","triangles":5000,"method":"cluster","normal_map":256}]})",
+        R"({"steps":[{"do":"reduce","ratio":0.25,"normal_map":"off"}]})", R"({"steps":[{"do":"reduce"}]})"}) {
+    const auto recipe = parse_recipe(text);
+    ASSERT_TRUE(recipe);
+    EXPECT_TRUE(recipe->steps.empty());
+    ASSERT_TRUE(recipe->reduce);
+    const auto again = parse_recipe(recipe_json(*recipe));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
+    EXPECT_EQ(again->reduce->triangles, recipe->reduce->triangles);
+    EXPECT_EQ(again->reduce->ratio, recipe->reduce->ratio);
+    EXPECT_EQ(again->reduce->method, recipe->reduce->method);
+    EXPECT_EQ(again->reduce->normal_map, recipe->reduce->normal_map);
+  }
+  EXPECT_EQ(parse_recipe(R"({"steps":[{"do":"reduce","normal_map":"off"}]})")->reduce->normal_map, 0);
+}
+
+TEST(Recipe, OfAReductionMayGoOnWithLight) {
+  const auto recipe = parse_recipe(
+      R"({"quality":{"target_error":0.1},"steps":[{"do":"reduce","triangles":900},{"do":"prt","order":4}]})");
+  ASSERT_TRUE(recipe);
+  EXPECT_EQ(recipe->reduce->triangles, 900U);
+  EXPECT_EQ(recipe->steps.at(0).order, 4);
+  const auto again = parse_recipe(recipe_json(*recipe));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"prt"},{"do":"reduce"}]})"), (std::vector<std::string>{"/steps"}));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce"},{"do":"prt","order":77}]})"),
+            (std::vector<std::string>{"/steps/1/order"}));
+}
+
+TEST(Recipe, OfAReductionNamesWhatIsWrong) {
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce","triangles":9,"ratio":0.5}]})"),
+            (std::vector<std::string>{"/steps/0/ratio"}));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce","normal_map":"big"}]})"),
+            (std::vector<std::string>{"/steps/0/normal_map"}));
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"reduce"}]})"),
+            (std::vector<std::string>{"/quality"}));
+}
+
 TEST(Recipe, PromisesOfAGridNeedAResolutionLeftOpen) {
   EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid"}]})"));
   EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid","resolution":[4,4,4]}]})"),

@@ -1,8 +1,8 @@
+#include "core/scene/texture.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "core/trace/surface.h"
 
 namespace kiln {
 namespace {

@@ -1,0 +1,11 @@
+# The in-core simplifiers that the bench compares with: meshoptimizer always, OpenMesh where it is installed.
+add_executable(kiln_reduce_bench reduce.cpp)
+set_target_properties(kiln_reduce_bench PROPERTIES OUTPUT_NAME kiln_reduce)
+kiln_flags(kiln_reduce_bench)
+target_link_libraries(kiln_reduce_bench PRIVATE kiln_import kiln_reduce meshoptimizer::meshoptimizer)
+find_package(OpenMesh QUIET)
+if(OpenMesh_FOUND)
+  target_sources(kiln_reduce_bench PRIVATE reduce_openmesh.cpp)
+  target_link_libraries(kiln_reduce_bench PRIVATE OpenMeshCore OpenMeshTools)
+  target_compile_definitions(kiln_reduce_bench PRIVATE KILN_OPENMESH)
+endif()
