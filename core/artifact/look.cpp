@@ -51,11 +51,14 @@ float tone_map(float x) {
 
 Vec3f tone_map(const Vec3f& exposed) { return {tone_map(exposed.x), tone_map(exposed.y), tone_map(exposed.z)}; }
 
-float automatic_exposure(const Mesh& mesh, std::span<const Vec3f> radiance) {
-  const float reference = lit_percentile(corner_values(mesh, radiance));
+float exposure_for(float radiance) {
   const float displayed = kKnee - (1 - kKnee) * std::log((1 - kTarget) / (1 - kKnee));  // equation 1 solved for 0.8
-  const float exposure = displayed / reference;
+  const float exposure = displayed / radiance;
   return std::isnormal(exposure) ? exposure : 1.0F;
+}
+
+float automatic_exposure(const Mesh& mesh, std::span<const Vec3f> radiance) {
+  return exposure_for(lit_percentile(corner_values(mesh, radiance)));
 }
 
 std::vector<std::uint32_t> part_of_vertices(const Mesh& mesh) {

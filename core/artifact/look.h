@@ -23,6 +23,9 @@ Vec3f tone_map(const Vec3f& exposed);
 /// reaches does not count. `radiance` has one value per vertex. 1 where nothing is lit.
 float automatic_exposure(const Mesh&, std::span<const Vec3f> radiance);
 
+/// The exposure at which `radiance` displays as 0.8; 1 where there is none.
+float exposure_for(float radiance);
+
 /// Linear exit radiance of each vertex under BakedLight:
 ///   albedo factor x vertex colour x value + emission factor
 /// Textures are left out: a base colour texture multiplies in the viewer, textured emission does not count.

@@ -26,8 +26,8 @@ struct BakeInput {
   std::string spill_folder = ".";  // where a reduction puts aside what does not fit into memory
 };
 
-/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png (not of a
-/// reduction), report.json, log.txt.
+/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png (a
+/// reduction leaves it out where memory does not allow it), report.json, log.txt.
 struct ArtifactFile {
   std::string name;
   std::string media_type;

@@ -9,6 +9,8 @@
 #include "core/artifact/look.h"
 #include "core/artifact/png.h"
 #include "core/bake/eye_material.h"
+#include "core/scene/texture.h"
+#include "core/trace/reference.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -64,16 +66,17 @@ Hit first_facing(const Tracer& tracer, Vec3f origin, const Vec3f& direction) {
   return {};
 }
 
+/// `height` of the picture: 0 below, 1 above.
+Vec3f background(float height) {
+  const float t = std::clamp(height, 0.0F, 1.0F);
+  return Vec3f{0.055F, 0.06F, 0.07F} * (1 - t) + Vec3f{0.16F, 0.17F, 0.19F} * t;
+}
+
 struct Painter {
   const BakedScene& baked;
   const Tracer& tracer;
   std::vector<Vec3f> value;
   EyeLight light;
-
-  Vec3f background(float height) const {
-    const float t = std::clamp(height, 0.0F, 1.0F);
-    return Vec3f{0.055F, 0.06F, 0.07F} * (1 - t) + Vec3f{0.16F, 0.17F, 0.19F} * t;
-  }
 
   Vec3f color(const Vec3f& eye, const Vec3f& direction, float height) const {
     const Hit hit = first_facing(tracer, eye, direction);
@@ -104,34 +107,146 @@ std::uint8_t srgb_byte(float x) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(s, 0.0F, 1.0F) * 255));
 }
 
+/// The rays of a picture, row by row, those of a pixel together.
+struct Rays {
+  Camera camera;
+  Preview preview;
+
+  std::size_t of_pixel() const {
+    return static_cast<std::size_t>(preview.grid) * static_cast<std::size_t>(preview.grid);
+  }
+  std::size_t of_row() const { return static_cast<std::size_t>(preview.width) * of_pixel(); }
+  std::size_t rows() const { return static_cast<std::size_t>(preview.height); }
+  std::size_t all() const { return of_row() * rows(); }
+
+  struct Ray {
+    Vec3f direction;
+    float height;  // see background()
+  };
+  Ray at(std::size_t i) const {
+    const std::size_t pixel = i % of_row() / of_pixel(), part = i % of_pixel();
+    const auto grid = static_cast<std::size_t>(preview.grid);
+    const auto place = [&](std::size_t whole, std::size_t sub, int size) {
+      const float within = (static_cast<float>(sub) + 0.5F) / static_cast<float>(preview.grid);
+      return (static_cast<float>(whole) + within) / static_cast<float>(size) * 2 - 1;
+    };
+    const float px = place(pixel, part % grid, preview.width), py = -place(i / of_row(), part / grid, preview.height);
+    return {normalized(camera.forward + camera.right * px + camera.up * py), (py + 1) / 2};
+  }
+};
+
+/// PNG of what `color(i, ray)` says of each ray, linear.
+template <class Color>
+Bytes paint(const Rays& rays, const Color& color, Threads& threads) {
+  const Preview& preview = rays.preview;
+  const std::size_t width = static_cast<std::size_t>(preview.width), n = rays.of_pixel();
+  Bytes pixels(width * rays.rows() * 3);
+  threads.for_blocks(rays.rows(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
+      Vec3f sum;
+      for (std::size_t i = pixel * n; i < (pixel + 1) * n; ++i) sum += color(i, rays.at(i));
+      sum *= 1.0F / static_cast<float>(n);
+      for (std::size_t c = 0; c < 3; ++c) pixels[pixel * 3 + c] = srgb_byte(sum[c]);
+    }
+  });
+  return write_png({preview.width, preview.height, 3}, pixels);
+}
+
+/// The normal that a viewer shows: interpolated, and bent by the normal map in the interpolated tangent frame.
+Vec3f shown_normal(const Scene& scene, const SurfacePoint& place) {
+  const Mesh& mesh = scene.mesh;
+  const Part& part = scene.parts[mesh.part[place.triangle]];
+  const TextureRef& map = scene.materials[static_cast<std::size_t>(part.material)].normal_texture;
+  if (map.texture < 0 || map.uv_set != 0 || !part.has_tangent || !part.has_uv0) return place.normal;
+  Vec3f tangent, bitangent;
+  Vec2f uv;
+  const float weights[3] = {1 - place.u - place.v, place.u, place.v};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto v = mesh.triangles[place.triangle][c];
+    const Vec4f& t = mesh.tangent[v];
+    tangent += Vec3f{t.x, t.y, t.z} * weights[c];
+    bitangent += cross(mesh.normal[v], Vec3f{t.x, t.y, t.z}) * (t.w * weights[c]);
+    uv = {uv.x + mesh.uv0[v].x * weights[c], uv.y + mesh.uv0[v].y * weights[c]};
+  }
+  const Vec4f texel = sample_texture(scene, map, uv, false);
+  const Vec3f bent = normalized(tangent) * ((2 * texel.x - 1) * map.scale) +
+                     normalized(bitangent) * ((2 * texel.y - 1) * map.scale) + place.normal * (2 * texel.z - 1);
+  if (!(dot(bent, bent) > 0) || !std::isfinite(dot(bent, bent))) return place.normal;
+  const Vec3f normal = normalized(bent);
+  return dot(normal, place.geometric_normal) > 0 ? normal : place.normal;
+}
+
+/// What a stretch of rays sees, by the path tracer: linear radiance, and -1 where nothing is.
+void look(const Tracer& tracer, const Rays& rays, const ReferenceLight& light, const PlainPreview& how,
+          std::size_t begin, std::span<Vec3f> seen, Threads& threads) {
+  const Scene& scene = tracer.scene();
+  std::vector<SurfacePoint> places(seen.size());
+  std::vector<std::uint8_t> found(seen.size());
+  threads.for_blocks(seen.size(), 1024, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Hit hit = first_facing(tracer, rays.camera.eye, rays.at(begin + i).direction);
+      found[i] = hit ? 1 : 0;
+      if (hit) places[i] = surface_point(scene, hit.triangle, hit.u, hit.v);
+    }
+  });
+  std::vector<ReferencePoint> points;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (found[i] != 0)
+      points.push_back({places[i].position, shown_normal(scene, places[i]), places[i].geometric_normal});
+  }
+  const ReferenceOptions options{.samples = how.samples, .bounces = how.bounces, .seed = begin};
+  const std::vector<Vec3d> value = trace_reference(tracer, points, light, options, threads).value;
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    seen[i] = {-1, -1, -1};
+    if (found[i] == 0) continue;
+    const Vec3f arriving = to_float(value[k] + value[points.size() + k]);  // the sky's, and the scene's own lights'
+    seen[i] = arriving * albedo_at(scene, places[i]) + emission_at(scene, places[i]);
+    ++k;
+  }
+}
+
+/// As automatic_exposure, over what is seen.
+float exposure_of(std::span<const Vec3f> seen) {
+  std::vector<float> bright;
+  for (const Vec3f& c : seen) {
+    if (const float b = std::max({c.x, c.y, c.z}); b > 0) bright.push_back(b);
+  }
+  if (bright.empty()) return 1;
+  const auto at = bright.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(bright.size() - 1) * 0.9);
+  std::nth_element(bright.begin(), at, bright.end());
+  return exposure_for(*at);
+}
+
 }  // namespace
 
 Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview& preview,
                              Threads& threads) {
-  const Camera camera = frame_camera(decoded.scene.mesh, preview);
+  const Rays rays{frame_camera(decoded.scene.mesh, preview), preview};
   const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients),
                         eye_light(decoded, decoded.light.coefficients, true)};
-  const auto width = static_cast<std::size_t>(preview.width), height = static_cast<std::size_t>(preview.height);
-  Bytes pixels(width * height * 3);
-  threads.for_blocks(height, 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) {
-      for (std::size_t x = 0; x < width; ++x) {
-        Vec3f sum;
-        for (int s = 0; s < preview.grid * preview.grid; ++s) {
-          const int column = s % preview.grid, row = s / preview.grid;
-          const float dx = (static_cast<float>(column) + 0.5F) / static_cast<float>(preview.grid);
-          const float dy = (static_cast<float>(row) + 0.5F) / static_cast<float>(preview.grid);
-          const float px = (static_cast<float>(x) + dx) / static_cast<float>(width) * 2 - 1;
-          const float py = 1 - (static_cast<float>(y) + dy) / static_cast<float>(height) * 2;
-          const Vec3f direction = normalized(camera.forward + camera.right * px + camera.up * py);
-          sum += painter.color(camera.eye, direction, (py + 1) / 2);
-        }
-        sum *= 1.0F / static_cast<float>(preview.grid * preview.grid);
-        for (std::size_t c = 0; c < 3; ++c) pixels[(y * width + x) * 3 + c] = srgb_byte(sum[c]);
-      }
-    }
-  });
-  return write_png({preview.width, preview.height, 3}, pixels);
+  const auto color = [&](std::size_t, const Rays::Ray& ray) {
+    return painter.color(rays.camera.eye, ray.direction, ray.height);
+  };
+  return paint(rays, color, threads);
+}
+
+Bytes render_plain_preview(const Tracer& tracer, const Environment& sky, const PlainPreview& how, Threads& threads) {
+  constexpr std::size_t kRows = 16;  // whose points are held at a time
+  const Rays rays{frame_camera(tracer.scene().mesh, how.picture), how.picture};
+  const ReferenceLight light{.environments = {sky}, .sh = {}, .scene_lights = true};
+  std::vector<Vec3f> seen(rays.all());
+  for (std::size_t row = 0; row < rays.rows(); row += kRows) {
+    const std::size_t begin = row * rays.of_row(), rows = std::min(kRows, rays.rows() - row);
+    look(tracer, rays, light, how, begin, std::span(seen).subspan(begin, rows * rays.of_row()), threads);
+    threads.check();
+    if (how.advance) how.advance(row + rows, rays.rows());
+  }
+  const float exposure = exposure_of(seen);
+  const auto color = [&](std::size_t i, const Rays::Ray& ray) {
+    return seen[i].x < 0 ? background(ray.height) : tone_map(seen[i] * exposure);
+  };
+  return paint(rays, color, threads);
 }
 
 }  // namespace kiln

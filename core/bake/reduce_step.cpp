@@ -9,6 +9,8 @@
 #include "core/artifact/reduced_glb.h"
 #include "core/artifact/triangle_stream.h"
 #include "core/bake/bake_log.h"
+#include "core/bake/job_light.h"
+#include "core/bake/preview.h"
 #include "core/bake/provenance.h"
 #include "core/reduce/measure.h"
 #include "core/reduce/reduce.h"
@@ -21,6 +23,10 @@ using nlohmann::ordered_json;
 constexpr std::uint64_t kMostByDefault = 200'000;
 constexpr double kShareByDefault = 0.1;
 
+// What a preview holds at most, measured on results of 20,000 to a million triangles.
+constexpr std::uint64_t kPreviewBytes = 40 << 20, kPreviewBytesPerTriangle = 450, kPreviewBytesPerTexel = 10;
+constexpr double kPreviewSeconds = 2;  // of one processor
+
 struct Decision {
   std::string decision, value, reason;
 };
@@ -30,6 +36,7 @@ struct Prepared {
   TriangleSource source;
   Reduce params;
   ReducePlan plan;
+  std::uint64_t preview_bytes = 0;  // 0: no preview
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;
 };
@@ -67,6 +74,25 @@ void decide(Prepared& p, const ReduceStep& step) {
                          step.normal_map ? asked : "eight texels a triangle of the model, as the memory allows"});
 }
 
+/// A preview traces the result, which must fit into memory for that: a reduction alone holds less.
+void decide_preview(Prepared& p, const BakeInput& input) {
+  if (input.recipe.bakes_light()) return;  // that bake makes one
+  const std::uint64_t triangles = std::min(p.params.triangles, p.source.triangles);
+  const auto side = static_cast<std::uint64_t>(p.plan.map_side);
+  const std::uint64_t needed =
+      kPreviewBytes + kPreviewBytesPerTriangle * triangles + kPreviewBytesPerTexel * side * side;
+  if (needed > p.params.memory_bytes) {
+    p.decisions.push_back({"preview", "none",
+                           "to trace a picture of " + std::to_string(triangles) + " triangles takes " +
+                               std::to_string((needed >> 20) + 1) + " MB, more than limits.memory_mb"});
+    return;
+  }
+  p.preview_bytes = needed;
+  const bool own = input.recipe.environment.kind != EnvironmentChoice::Kind::none;
+  p.decisions.push_back(
+      {"preview", "path traced", own ? "under the environment of the recipe" : "under a uniform sky"});
+}
+
 Result<Prepared> prepare(const BakeInput& input) {
   const ReduceStep& step = *input.recipe.reduce;
   Prepared p;
@@ -76,7 +102,8 @@ Result<Prepared> prepare(const BakeInput& input) {
   if (findings.failed()) return tl::make_unexpected(findings.fault());
   p.warnings = findings.warnings();
   if (input.recipe.environment.kind != EnvironmentChoice::Kind::none && !input.recipe.bakes_light())
-    p.warnings.push_back({"environment_unused", "A reduction needs no light; the environment has no effect.", ""});
+    p.warnings.push_back(
+        {"environment_unused", "A reduction needs no light: the environment lights preview.png and nothing else.", ""});
   if (input.recipe.strict && !p.warnings.empty()) {
     const Warning& first = p.warnings.front();
     return fault("strict_" + first.code, "strict: " + first.message, first.where);
@@ -89,6 +116,7 @@ Result<Prepared> prepare(const BakeInput& input) {
   KILN_TRY(plan, plan_reduction(p.source, p.params));
   p.plan = plan;
   decide(p, step);
+  decide_preview(p, input);
   if (input.recipe.bakes_light())
     p.decisions.push_back({"light", "afterwards", "its bake is planned when the reduced scene is there"});
   return p;
@@ -113,8 +141,8 @@ ordered_json prediction_object(const Prepared& p) {
   return {{"triangles", triangles},
           {"vertices", triangles / 2},
           {"rays", 0},
-          {"seconds", p.plan.seconds},
-          {"memory_bytes", p.plan.memory_bytes},
+          {"seconds", p.plan.seconds + (p.preview_bytes > 0 ? kPreviewSeconds : 0)},
+          {"memory_bytes", std::max(p.plan.memory_bytes, p.preview_bytes)},
           {"artifact_bytes", 60 * triangles + 2 * texels}};
 }
 
@@ -169,9 +197,10 @@ std::string log_text(const Prepared& p, const BakeLog& log) {
   return text;
 }
 
-BakeOutput output_of(Bytes glb, const std::string& report, const std::string& log) {
+BakeOutput output_of(Bytes glb, Bytes preview, const std::string& report, const std::string& log) {
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(glb)});
+  if (!preview.empty()) output.files.push_back({"preview.png", "image/png", std::move(preview)});
   output.files.push_back({"report.json", "application/json", Bytes(report.begin(), report.end())});
   output.files.push_back({"log.txt", "text/plain; charset=utf-8", Bytes(log.begin(), log.end())});
   return output;
@@ -180,6 +209,31 @@ BakeOutput output_of(Bytes glb, const std::string& report, const std::string& lo
 std::string stem_of(const std::string& name) {
   const std::string stem = std::filesystem::path(name).stem().string();
   return stem.empty() ? "model" : stem;
+}
+
+/// The pixels of a reduced model's normal map, which an import leaves alone.
+void put_normal_map(Scene& scene, const SurfaceMaps& maps) {
+  if (maps.side == 0) return;
+  const int texture = scene.materials.front().normal_texture.texture;
+  Image& image = scene.images[static_cast<std::size_t>(scene.textures[static_cast<std::size_t>(texture)].image)];
+  image.width = image.height = maps.side;
+  image.rgba.assign(4 * (maps.normal.size() / 3), 255);
+  for (std::size_t i = 0; i < maps.normal.size(); ++i) image.rgba[i / 3 * 4 + i % 3] = maps.normal[i];
+}
+
+/// preview.png of what is delivered. A picture that cannot be made costs the job nothing but a warning.
+Result<Bytes> preview_of(const BakeInput& input, const Bytes& glb, const SurfaceMaps& maps, BakeLog& log,
+                         Threads& threads) {
+  ImportLimits limits;
+  limits.max_memory_bytes = input.recipe.limits.memory_mb << 20;
+  limits.max_total_pixels = std::min(limits.max_total_pixels, limits.max_memory_bytes / 16);
+  KILN_TRY(light, job_light(input));
+  KILN_TRY(scene, import_scene({.name = "scene.glb", .main = glb, .resources = {}}, limits));
+  put_normal_map(scene, maps);
+  const Tracer tracer(scene, threads);
+  return render_plain_preview(tracer, light ? *light : constant_sky({1, 1, 1}),
+                              {.advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); }},
+                              threads);
 }
 
 /// The reduction alone.
@@ -205,7 +259,8 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
          "The pieces of the surface do not fit into the largest normal map that limits.memory_mb allows.",
          "/steps/0/normal_map"});
   }
-  log.begin("write", 1);
+  const double written_at = p.preview_bytes > 0 ? 0.94 : 1;
+  log.begin("write", written_at);
   Bytes glb;
   if (as_it_is) {
     glb.assign(file.begin(), file.end());
@@ -217,11 +272,22 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
                                          .provenance = provenance(input)}));
     glb = std::move(written);
   }
+  const std::uint64_t triangles = p.plan.unchanged ? reduced.input_triangles : reduced.mesh.triangles.size();
+  const std::size_t vertices = as_it_is ? p.source.vertices : reduced.mesh.position.size();
+  Bytes preview;
+  if (p.preview_bytes > 0) {
+    reduced.mesh = {};  // room for its copy in the tracer
+    log.begin("preview", 1);
+    auto made = preview_of(input, glb, reduced.maps, log, threads);
+    if (made)
+      preview = std::move(*made);
+    else
+      p.warnings.push_back(
+          {"preview_left_out", "There is no preview.png: " + made.error().message, made.error().where});
+  }
   log.end();
   ordered_json report = report_head(input, p, log);
   report["scene"]["triangles"] = reduced.input_triangles;
-  const std::uint64_t triangles = p.plan.unchanged ? reduced.input_triangles : reduced.mesh.triangles.size();
-  const std::size_t vertices = as_it_is ? p.source.vertices : reduced.mesh.position.size();
   report["result"] = {{"triangles", triangles}, {"vertices", vertices}, {"bytes", glb.size()}};
   report["reduce"] = {{"unchanged", p.plan.unchanged},
                       {"clustered_triangles", reduced.clustered_triangles},
@@ -231,7 +297,7 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
                       {"charts", reduced.charts},
                       {"texels_filled", reduced.maps.filled},
                       {"own_memory_bytes", std::max(reduced.own_memory_bytes, own_memory_bytes())}};
-  return output_of(std::move(glb), text_of(report), log_text(p, log));
+  return output_of(std::move(glb), std::move(preview), text_of(report), log_text(p, log));
 }
 
 /// The progress of one of two bakes that follow each other.

@@ -40,7 +40,7 @@ TEST(ReduceStep, MakesAPlainSceneWithANormalMapAndAReport) {
   const BakeInput input = ball(R"({"steps":[{"do":"reduce","triangles":2000}]})");
   const auto output = bake_once(input);
   ASSERT_TRUE(output) << output.error().message;
-  ASSERT_EQ(output->files.size(), 3U);
+  ASSERT_EQ(output->files.size(), 4U);
   EXPECT_EQ(output->files[0].name, "scene.glb");
   const auto scene = import_scene({.name = "scene.glb", .main = file(*output, "scene.glb"), .resources = {}});
   ASSERT_TRUE(scene) << scene.error().message;
@@ -160,7 +160,7 @@ TEST(ReduceStep, TellsItsProgressWithoutFallingBack) {
       threads);
   ASSERT_TRUE(output);
   EXPECT_EQ(stages,
-            (std::vector<std::string>{"read", "measure", "collect", "collapse", "atlas", "project", "maps", "write"}));
+            (std::vector<std::string>{"read", "measure", "collect", "collapse", "atlas", "project", "maps", "write", "preview"}));
   EXPECT_EQ(last, 1);
 }
 

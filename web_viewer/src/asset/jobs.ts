@@ -182,5 +182,14 @@ export interface Report {
     rays_per_vertex: number;
     certificate: { relrmse: number; interval?: [number, number]; sources?: Record<string, number> } | null;
   };
+  recipe?: { environment?: { builtin?: string; rotation_deg?: number } | null };
+  reduce?: {
+    unchanged: boolean;
+    error: { rms: number; max: number; rms_back: number; max_back: number }; // in parts of the diagonal of the model's box
+    normal_degrees_rms: number;
+    normal_degrees_rms_without_map: number;
+    charts: number;
+    input?: { triangles?: number }; // where the recipe goes on with light; else `scene` is about the model
+  };
   glossy?: Partial<Record<'radiance' | 'transport' | 'truncation', { relrmse: number; interval?: [number, number] }>>;
 }

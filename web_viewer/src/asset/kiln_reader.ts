@@ -115,7 +115,7 @@ export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTr
 }
 
 /// light[3 * i + channel] of the bake; empty when it had no environment.
-export const bakedLight = ({ light }: RadianceTransferExtension): Float32Array =>
+export const bakedLight = ({ light }: Pick<RadianceTransferExtension, 'light'>): Float32Array =>
   Float32Array.from((light?.coefficients ?? []).flat());
 
 /// The mean and the rows of the components, from the bytes of their buffer view (little endian). Throws on another size.

@@ -5,6 +5,7 @@
 
 import { type Group, TextureLoader, type Object3D } from 'three';
 import { GLTFLoader, type GLTF, type GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
+import { splitGlb } from './glb';
 
 interface Json {
   scenes?: unknown[];
@@ -31,6 +32,22 @@ export async function parseGltf(file: ArrayBuffer, bytes: number): Promise<Loade
   const gltf = await loader.parseAsync(file, '');
   return { gltf, bytes, hasOriginal: scenes.length > 1, loadOriginal: () => loadSecondScene(gltf.parser, scenes) };
 }
+
+/// A glTF without transfer vectors, as it came. Throws, in words, on a compression that this page does not read.
+export async function parsePlainGltf(file: ArrayBuffer): Promise<GLTF> {
+  const used = (splitGlb(file).json as { extensionsUsed?: string[] }).extensionsUsed ?? [];
+  const compression = used.find((name) => kCompressions.includes(name));
+  if (compression)
+    throw new Error(`The model came back as it was sent, compressed with ${compression}, which this page cannot read.`);
+  const loader = new GLTFLoader();
+  loader.register((parser) => {
+    useImageElements(parser);
+    return { name: 'KILN_plain' };
+  });
+  return loader.parseAsync(file, '');
+}
+
+const kCompressions = ['KHR_draco_mesh_compression', 'EXT_meshopt_compression', 'KHR_texture_basisu'];
 
 /// GLTFLoader prefers fetch(blob:) for images, which our Content-Security-Policy forbids (connect-src 'self'); <img> is allowed.
 function useImageElements(parser: GLTFParser): void {

@@ -74,6 +74,9 @@ export interface Packed {
   extension: RadianceTransferExtension;
 }
 
+/// Whether a GLB is one of ours that can be relit. Throws, in words, on what is no GLB.
+export const carriesTransfer = (file: ArrayBuffer): boolean => readExtension(splitGlb(file).json) !== undefined;
+
 /// Throws, in words, on a file that is not as core/artifact/README.md says.
 export function readPacked(file: ArrayBuffer): Packed {
   const { json, binary } = splitGlb(file);

@@ -31,18 +31,54 @@ export class Comparison {
   /// The exposure of the original, as a multiple of that of the baked side.
   exposure = 1;
   private readonly scene = new Scene();
+  private readonly light: OriginalLight;
+
+  constructor(
+    private readonly stage: Stage,
+    original: Object3D,
+  ) {
+    this.light = new OriginalLight(this.scene, original);
+    stage.drawWith = (width, height) => this.draw(width, height);
+  }
+
+  setLight(light: ComparisonLight): void {
+    this.light.set(light);
+  }
+
+  private draw(width: number, height: number): void {
+    const { renderer, scene, camera } = this.stage;
+    const split = Math.round(this.divider * width);
+    renderer.setScissorTest(true);
+    renderer.setScissor(0, 0, split, height);
+    const own = renderer.toneMappingExposure;
+    renderer.toneMappingExposure = own * this.exposure;
+    renderer.render(this.scene, camera);
+    renderer.toneMappingExposure = own;
+    renderer.setScissor(split, 0, width - split, height);
+    renderer.render(scene, camera);
+    renderer.setScissorTest(false);
+  }
+
+  dispose(): void {
+    this.stage.drawWith = null;
+    this.light.dispose();
+  }
+}
+
+/// A model with its original materials in a scene of three's, lit by three's image-based light and by lamps for suns. Owns
+/// the model.
+export class OriginalLight {
   private readonly background = new SkyBackground();
   private readonly suns = new Group();
 
   constructor(
-    private readonly stage: Stage,
+    private readonly scene: Scene,
     private readonly original: Object3D,
   ) {
-    this.scene.add(original, this.background.mesh, this.suns);
-    stage.drawWith = (width, height) => this.draw(width, height);
+    scene.add(original, this.background.mesh, this.suns);
   }
 
-  setLight({ reflection, suns, background, rotation, intensity, lamps }: ComparisonLight): void {
+  set({ reflection, suns, background, rotation, intensity, lamps }: ComparisonLight): void {
     this.scene.environment = reflection;
     this.scene.environmentRotation.y = (rotation * Math.PI) / 180;
     this.scene.environmentIntensity = intensity;
@@ -63,25 +99,11 @@ export class Comparison {
     }
   }
 
-  private draw(width: number, height: number): void {
-    const { renderer, scene, camera } = this.stage;
-    const split = Math.round(this.divider * width);
-    renderer.setScissorTest(true);
-    renderer.setScissor(0, 0, split, height);
-    const own = renderer.toneMappingExposure;
-    renderer.toneMappingExposure = own * this.exposure;
-    renderer.render(this.scene, camera);
-    renderer.toneMappingExposure = own;
-    renderer.setScissor(split, 0, width - split, height);
-    renderer.render(scene, camera);
-    renderer.setScissorTest(false);
-  }
-
   dispose(): void {
-    this.stage.drawWith = null;
     this.scene.environment = null;
     this.background.dispose();
-    this.suns.clear();
+    this.suns.removeFromParent();
+    this.original.removeFromParent();
     const materials = new Set<Material>();
     this.original.traverse((object) => {
       const { geometry, material } = object as Mesh;

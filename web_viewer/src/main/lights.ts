@@ -25,7 +25,7 @@ export class Lights {
   readonly order: number;
   private readonly bakedName: string;
 
-  constructor(extension: RadianceTransferExtension) {
+  constructor(extension: Pick<RadianceTransferExtension, 'order' | 'light'>) {
     const { order, light } = extension;
     const baked = bakedLight(extension);
     [this.order, this.bakedName] = [order, light?.name ?? ''];

@@ -1,9 +1,9 @@
 // The entry of `/view/{id}`, kept small so that it runs early: asks for the job, fetches its scene.glb, sets the light worker to
 // decode it, and makes the WebGL context. three.js and all that uses it (view.ts) arrive meanwhile.
 
-import { artifact, artifactUrl, explain, finished, follow, getJob, type Job } from '../asset/jobs';
+import { artifact, artifactUrl, explain, finished, follow, getJob, getReport, type Job } from '../asset/jobs';
 import { download } from '../asset/download';
-import { readPacked } from '../asset/unpack';
+import { carriesTransfer, readPacked } from '../asset/unpack';
 import { Relighter } from '../light/relighter';
 import { announce } from '../ui/dom';
 import { bytes } from '../ui/format';
@@ -65,6 +65,7 @@ async function open(page: Page): Promise<void> {
   const file = await fetchScene(artifactUrl(job, 'scene.glb'), page);
   performance.mark('kiln:fetched');
   const size = file.byteLength;
+  if (!carriesTransfer(file)) return openPlain(page, job, file, relighter);
   const { extension } = readPacked(file);
   const opened = relighter.open(file);
   await relighter.begun; // it cannot start while the next line blocks this thread
@@ -72,6 +73,14 @@ async function open(page: Page): Promise<void> {
   performance.mark('kiln:context');
   const { show } = await viewer;
   await show(page, job, { context, relighter, extension, opened, size });
+}
+
+/// What the step `reduce` made is shown as it is; another glTF without transfer vectors is none of ours.
+async function openPlain(page: Page, job: Job, file: ArrayBuffer, relighter: Relighter): Promise<void> {
+  const report = artifact(job, 'report.json') ? await getReport(job).catch(() => null) : null;
+  if (!report?.reduce) return void readPacked(file); // throws, and says why
+  const { showPlain } = await import('./plain_view');
+  await showPlain(page, job, { context: createContext(page.canvas), relighter, file, report });
 }
 
 async function start(): Promise<void> {

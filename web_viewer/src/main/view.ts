@@ -114,7 +114,7 @@ async function openGrid(page: Page, viewer: Viewer, job: Job): Promise<void> {
   }
 }
 
-function toolbar(viewer: Viewer, job: Job, actions: KeyActions): HTMLElement {
+export function toolbar(viewer: Pick<Viewer, 'stage' | 'state'>, job: Job, actions: KeyActions): HTMLElement {
   const { stage, state } = viewer;
   const button = (text: string, keys: string, action: () => void) =>
     h('button', { type: 'button', title: keys, onclick: action }, text);

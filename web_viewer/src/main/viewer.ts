@@ -17,7 +17,7 @@ import { Wireframe } from './wireframe';
 /// What the legend shows.
 export type Legend = Pick<HeatMapData, 'map' | 'range'> | null;
 
-const kWellExposed = 0.877; // the bake's tone map shows it as 0.8 of white: its own target for bright surfaces
+export const kWellExposed = 0.877; // the bake's tone map shows it as 0.8 of white: its own target for bright surfaces
 const kOverexposed = 3 * kWellExposed;
 
 const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light' && mode !== 'grid';
@@ -104,6 +104,10 @@ export class Viewer {
     if (has('compare')) void this.compare(state.compare);
     if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare', 'mode')) this.showSky();
     this.stage.requestDraw();
+  }
+
+  get lamps(): boolean {
+    return this.model.transfer.fixed;
   }
 
   get lights(): Lights {

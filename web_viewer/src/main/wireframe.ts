@@ -2,8 +2,12 @@
 // While it stands the surfaces are moved back to leave it room. Not otherwise: the offset grows with a surface's slope,
 // and what lies behind a steep one would show through along its edges.
 
-import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type Material } from 'three';
-import type { BakedModel } from './baked_model';
+import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type Material, type Mesh } from 'three';
+
+/// What a wireframe stands on: indexed meshes.
+export interface Wired {
+  parts: readonly { mesh: Mesh<BufferGeometry, Material | Material[]> }[];
+}
 
 export class Wireframe {
   private readonly material = new LineBasicMaterial({
@@ -15,7 +19,7 @@ export class Wireframe {
   private readonly lines: LineSegments[];
   private readonly moved = new Set<Material>();
 
-  constructor(private readonly model: BakedModel) {
+  constructor(private readonly model: Wired) {
     this.lines = model.parts.map(({ mesh }) => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', mesh.geometry.getAttribute('position'));

@@ -1,17 +1,28 @@
 // What is known about the result: counts, certificate, plan, warnings.
 
 import type { Report } from '../asset/jobs';
-import type { Viewer } from '../main/viewer';
+import type { StoredTransfer } from '../asset/kiln_reader';
 import { h } from './dom';
 import { bytes, count, percent, plain, seconds } from './format';
 
 type Row = readonly [string, string];
 
-export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
+/// What is counted.
+interface Counted {
+  asset: { bytes: number };
+  model: {
+    vertices: number;
+    triangles: number;
+    transfer: Pick<StoredTransfer, 'order' | 'channels' | 'fixed' | 'slots' | 'units'> | null;
+  };
+}
+
+export function statistics(viewer: Counted, report: Report | null): HTMLElement {
   const box = h('div', { class: 'statistics' }, pairs(sizes(viewer)));
   if (!report) return box;
   if (report.certificate?.relrmse !== undefined)
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
+  if (report.reduce) box.append(h('h3', {}, 'Reduction'), pairs(reduction(report.reduce, report)));
   if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
   if (report.glossy?.radiance) box.append(h('h3', {}, 'Specular parts'), pairs(specular(report.glossy)));
   if (report.warnings?.length)
@@ -23,13 +34,17 @@ export function statistics(viewer: Viewer, report: Report | null): HTMLElement {
   return box;
 }
 
-function sizes({ model, asset }: Viewer): Row[] {
-  const { order, channels, fixed, slots, units } = model.transfer;
+function sizes({ model, asset }: Counted): Row[] {
   const per = asset.bytes / Math.max(1, model.vertices);
-  return [
+  const rows: Row[] = [
     ['Vertices', count(model.vertices)],
     ['Triangles', count(model.triangles)],
     ['File', `${bytes(asset.bytes)}, ${per.toFixed(1)} B per vertex`],
+  ];
+  if (!model.transfer) return rows;
+  const { order, channels, fixed, slots, units } = model.transfer;
+  return [
+    ...rows,
     ['Harmonics', order > 0 ? `order ${order}, ${order * order} × ${channels === 3 ? 'RGB' : 'grey'}` : 'none: radiosity'],
     ['Numbers per vertex', `${channels * slots}${fixed ? ', lamps among them' : ''}`],
     ['Units', (units ?? '–').replace('^-1', '⁻¹').replace('^-2', '⁻²')],
@@ -71,6 +86,23 @@ function certificate(c: NonNullable<Report['certificate']>, from: Report['error_
     h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval(c.interval)}`),
     pairs(rows),
   );
+}
+
+/// Distances in parts of the diagonal of the model's box.
+function reduction(of: NonNullable<Report['reduce']>, { scene, result }: Report): Row[] {
+  const before = of.input ?? (scene as { triangles?: number } | undefined);
+  const after = of.input ? (scene as { triangles?: number } | undefined) : result;
+  if (of.unchanged) return [['Triangles', `${count(before?.triangles)}, as they came`]];
+  const { error: e } = of;
+  const degrees = (value: number) => `${value.toPrecision(2)}°`;
+  const bent = of.charts > 0 ? ` RMS, ${degrees(of.normal_degrees_rms_without_map)} without the normal map` : ' RMS';
+  return [
+    ['Triangles in', count(before?.triangles)],
+    ['Triangles out', count(after?.triangles)],
+    ['From the model to this', `${percent(e.rms)} of the diagonal RMS, at most ${percent(e.max)}`],
+    ['From this to the model', `${percent(e.rms_back)} RMS, at most ${percent(e.max_back)}`],
+    ['Normals', degrees(of.normal_degrees_rms) + bent],
+  ];
 }
 
 function grid(of: NonNullable<Report['grid']>): Row[] {

@@ -1,18 +1,34 @@
 // The panel beside the picture: light, look, what is shown, statistics.
 
-import type { Viewer } from '../main/viewer';
+import type { StoredTransfer } from '../asset/kiln_reader';
+import type { Lights } from '../main/lights';
+import type { Store } from '../main/store';
 import type { ViewState } from '../main/view_state';
 import { Controls } from './controls';
 import { h, toast } from './dom';
 
 const kDegrees = (value: number) => `${Math.round(value)}°`;
 
+/// What the panel is about.
+export interface Shown {
+  readonly state: Store<ViewState>;
+  readonly lights: Lights;
+  readonly lamps: boolean; // the scene has some
+  readonly asset: { hasOriginal: boolean };
+  readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
+  onLights: () => void;
+  useFile(file: File): Promise<void>;
+}
+
+const kPlain =
+  'This model was reduced, not lit: there is no light in it to look at or to compare with. Add a step prt, radiosity or grid to the recipe.';
+
 export class ViewPanel {
   readonly element: HTMLElement;
   private readonly controls: Controls;
 
   constructor(
-    private readonly viewer: Viewer,
+    private readonly viewer: Shown,
     statistics: HTMLElement,
     private readonly hasGrid: boolean,
   ) {
@@ -41,7 +57,7 @@ export class ViewPanel {
       controls.slider('rotation', 'Rotation', { min: -180, max: 180, step: 1, show: kDegrees }),
       controls.slider('intensity', 'Intensity', { min: 0, max: 4, step: 0.01, show: (v) => `× ${v.toFixed(2)}` }),
     ];
-    if (viewer.model.transfer.fixed) out.push(controls.checkbox('lamps', 'Lamps of the scene'));
+    if (viewer.lamps) out.push(controls.checkbox('lamps', 'Lamps of the scene'));
     return out;
   }
 
@@ -89,12 +105,13 @@ export class ViewPanel {
       { id: 'coefficient', label: 'One coefficient' },
     ];
     if (this.hasGrid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
+    if (!viewer.model.transfer) return this.showPlain();
     const { channels, slots } = viewer.model.transfer;
     const slot = h(
       'div',
       { class: 'sub' },
       controls.number('slot', 'Coefficient', 0, slots - 1),
-      slotName(viewer, controls),
+      slotName(viewer.model.transfer, controls),
     );
     if (channels === 3) slot.prepend(controls.numbered('channel', 'Channel', ['red', 'green', 'blue']));
     controls.bind('mode', (mode) => (slot.hidden = mode !== 'coefficient'));
@@ -105,6 +122,22 @@ export class ViewPanel {
       ...(this.hasGrid ? this.grid() : []),
       compareSwitch(viewer, controls),
     ];
+  }
+
+  /// What only baked light has is there, so that it can be found, and disabled.
+  private showPlain(): HTMLElement[] {
+    const { controls, viewer } = this;
+    const why = h('p', { class: 'hint', id: 'why-plain' }, kPlain);
+    const mode = { id: 'c-mode', disabled: true, 'aria-describedby': why.id };
+    const surface = h(
+      'div',
+      { class: 'field' },
+      h('label', { for: mode.id }, 'Surface'),
+      h('select', mode, h('option', {}, 'Lit surface')),
+    );
+    const compare = compareSwitch(viewer, controls);
+    compare.querySelector('input')!.setAttribute('aria-describedby', why.id);
+    return [controls.checkbox('wire', 'Wireframe'), surface, compare, why];
   }
 
   private grid(): HTMLElement[] {
@@ -123,17 +156,17 @@ export class ViewPanel {
   }
 }
 
-function slotName(viewer: Viewer, controls: Controls): HTMLElement {
+function slotName({ order }: Pick<StoredTransfer, 'order'>, controls: Controls): HTMLElement {
   const text = h('p', { class: 'hint' });
   controls.bind('slot', (slot) => {
     const band = Math.floor(Math.sqrt(slot));
-    const lamp = slot === viewer.model.transfer.order ** 2;
+    const lamp = slot === order ** 2;
     text.textContent = lamp ? 'Light of the scene’s own lamps' : `Band l = ${band}, m = ${slot - band * (band + 1)}`;
   });
   return text;
 }
 
-function compareSwitch(viewer: Viewer, controls: Controls): HTMLElement {
+function compareSwitch(viewer: Shown, controls: Controls): HTMLElement {
   const input = h('input', { type: 'checkbox', id: 'c-compare', disabled: !viewer.asset.hasOriginal });
   input.addEventListener('change', () => viewer.state.set({ compare: input.checked ? 0.5 : null }));
   controls.bind('compare', (divider) => (input.checked = divider !== null));
