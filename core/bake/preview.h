@@ -23,7 +23,7 @@ Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, co
 
 struct PlainPreview {
   Preview picture;
-  int samples = 16;  // paths a ray
+  int samples = 64;  // paths a ray
   int bounces = 1;
   std::function<void(std::uint64_t done, std::uint64_t total)> advance;
 };

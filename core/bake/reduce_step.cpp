@@ -23,9 +23,9 @@ using nlohmann::ordered_json;
 constexpr std::uint64_t kMostByDefault = 200'000;
 constexpr double kShareByDefault = 0.1;
 
-// What a preview holds at most, measured on results of 20,000 to a million triangles.
-constexpr std::uint64_t kPreviewBytes = 40 << 20, kPreviewBytesPerTriangle = 450, kPreviewBytesPerTexel = 10;
-constexpr double kPreviewSeconds = 2;  // of one processor
+// What a preview holds at most, and takes on two cores: measured on results of 8000 to a million triangles.
+constexpr std::uint64_t kPreviewBytes = 40 << 20, kPreviewBytesPerTriangle = 800, kPreviewBytesPerTexel = 10;
+constexpr double kPreviewSeconds = 1;
 
 struct Decision {
   std::string decision, value, reason;
