@@ -231,9 +231,10 @@ Result<Bytes> preview_of(const BakeInput& input, const Bytes& glb, const Surface
   KILN_TRY(scene, import_scene({.name = "scene.glb", .main = glb, .resources = {}}, limits));
   put_normal_map(scene, maps);
   const Tracer tracer(scene, threads);
-  return render_plain_preview(tracer, light ? *light : constant_sky({1, 1, 1}),
-                              {.advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); }},
-                              threads);
+  const auto advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
+  if (light) return render_plain_preview(tracer, *light, {.advance = advance}, threads);
+  // Under an even sky reflected light evens out the rest: a white model would show no shape.
+  return render_plain_preview(tracer, constant_sky({1, 1, 1}), {.bounces = 0, .advance = advance}, threads);
 }
 
 /// The reduction alone.
@@ -259,7 +260,7 @@ Result<BakeOutput> bake_reduction(const BakeInput& input, const Progress& progre
          "The pieces of the surface do not fit into the largest normal map that limits.memory_mb allows.",
          "/steps/0/normal_map"});
   }
-  const double written_at = p.preview_bytes > 0 ? 0.94 : 1;
+  const double written_at = p.preview_bytes > 0 ? 0.96 : 1;
   log.begin("write", written_at);
   Bytes glb;
   if (as_it_is) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/artifact/baked_scene.h"
+#include "core/artifact/image_decode.h"
 #include "core/base/sha256.h"
 #include "tests/core/bake/bake_input.h"
 #include "tests/core/reduce/models.h"
@@ -69,6 +70,49 @@ TEST(ReduceStep, GivesTheSameBytesForAnyNumberOfThreads) {
   const auto one = bake_once(input, 1), three = bake_once(input, 3);
   ASSERT_TRUE(one && three);
   EXPECT_EQ(file(*one, "scene.glb"), file(*three, "scene.glb"));
+  EXPECT_EQ(file(*one, "preview.png"), file(*three, "preview.png"));
+}
+
+/// The pixel in the middle of preview.png.
+std::array<int, 3> middle_of(const BakeOutput& output) {
+  const Bytes& png = file(output, "preview.png");
+  const auto header = read_image_header(png);
+  const auto pixels = decode_image(png, *header);
+  const std::size_t at = 4 * (header->height / 2 * header->width + header->width / 2);
+  return {(*pixels)[at], (*pixels)[at + 1], (*pixels)[at + 2]};
+}
+
+TEST(ReduceStep, ShowsAConvexModelUnderAnEvenSkyEvenly) {
+  BakeInput input;
+  input.scene = {.name = "ball.ply", .main = testing::binary_ply(testing::sphere(40)), .resources = {}};
+  input.recipe = *parse_recipe(R"({"steps":[{"do":"reduce","triangles":100000}]})");
+  const auto output = bake_once(input);
+  ASSERT_TRUE(output);
+  // Nothing shades anything: all of it is the 90th percentile, which displays as 0.8, 231 in sRGB. Vertex normals that
+  // lean over their faces lose some of 64 paths.
+  for (const int c : middle_of(*output)) EXPECT_NEAR(c, 231, 3);
+}
+
+TEST(ReduceStep, ShowsTheModelUnderTheLightOfTheJob) {
+  const auto output =
+      bake_once(ball(R"({"steps":[{"do":"reduce","triangles":2000}],"environment":{"constant":[0.2,0.4,0.8]}})"));
+  ASSERT_TRUE(output);
+  const auto [r, g, b] = middle_of(*output);
+  EXPECT_LT(r, g - 20);
+  EXPECT_LT(g, b - 20);
+  EXPECT_EQ(report_of(*output)["warnings"][0]["code"], "environment_unused");
+}
+
+TEST(ReduceStep, LeavesThePictureOutWhereItDoesNotFitIntoMemory) {
+  BakeInput input;
+  input.scene = {.name = "ball.ply", .main = testing::binary_ply(testing::sphere(100)), .resources = {}};
+  input.recipe = *parse_recipe(R"({"steps":[{"do":"reduce","triangles":200000}],"limits":{"memory_mb":110}})");
+  const auto output = bake_once(input);
+  ASSERT_TRUE(output) << output.error().message;
+  for (const ArtifactFile& f : output->files) EXPECT_NE(f.name, "preview.png");
+  const json plan = report_of(*output)["plan"];
+  EXPECT_EQ(plan.back()["decision"], "preview");
+  EXPECT_EQ(plan.back()["value"], "none");
 }
 
 TEST(ReduceStep, ReturnsASmallModelUnchangedWithANote) {
@@ -159,8 +203,8 @@ TEST(ReduceStep, TellsItsProgressWithoutFallingBack) {
       },
       threads);
   ASSERT_TRUE(output);
-  EXPECT_EQ(stages,
-            (std::vector<std::string>{"read", "measure", "collect", "collapse", "atlas", "project", "maps", "write", "preview"}));
+  EXPECT_EQ(stages, (std::vector<std::string>{"read", "measure", "collect", "collapse", "atlas", "project", "maps",
+                                              "write", "preview"}));
   EXPECT_EQ(last, 1);
 }
 

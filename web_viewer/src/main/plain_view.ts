@@ -40,7 +40,7 @@ export class PlainModel {
     root.updateMatrixWorld(true);
     this.bounds = new Box3().setFromObject(root);
     root.traverse((object) => {
-      if ((object as Mesh).isMesh) this.parts.push({ mesh: indexed(object as Mesh) });
+      if ((object as Mesh).isMesh) this.parts.push({ mesh: prepared(object as Mesh) });
       this.lamps ||= (object as Light).isLight === true;
     });
   }
@@ -59,8 +59,10 @@ export class PlainModel {
   }
 }
 
-function indexed(mesh: Mesh): Mesh {
-  const { geometry } = mesh;
+/// As a wireframe asks for it: with an index, and room for lines where it stands.
+function prepared(mesh: Mesh): Mesh {
+  const { geometry, material } = mesh;
+  for (const one of [material].flat()) one.polygonOffsetFactor = one.polygonOffsetUnits = 1;
   if (!geometry.index)
     geometry.setIndex(Array.from({ length: geometry.getAttribute('position').count }, (_, vertex) => vertex));
   return mesh;
@@ -155,7 +157,7 @@ function lightsOf({ recipe }: Report): Lights {
   const coefficients = Array.from({ length: flat.length / 3 }, (_, i) => Array.from(flat.subarray(3 * i, 3 * i + 3)));
   const like: Pick<RadianceTransferExtension, 'order' | 'light'> = { order: kOrder, light: { name: sky.id, coefficients } };
   const lights = new Lights(like);
-  lights.choices[0].label = asked ? `The job’s: ${asked.label}` : `No light was asked for: ${sky.label}`;
+  lights.choices[0].label = `${sky.label} (${asked ? 'the job’s' : 'by default'})`;
   return lights;
 }
 
