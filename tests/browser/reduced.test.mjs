@@ -7,6 +7,7 @@ import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { axeSource, openPage, startBrowser, until, withReady } from './browser.mjs';
 import { jobId, startMock } from './mock_server.mjs';
+import { load } from './sources.mjs';
 
 const fixture = (name) => readFileSync(new URL(`fixtures/${name}`, import.meta.url));
 const report = JSON.parse(fixture('reduced.json'));
@@ -125,14 +126,29 @@ for (const colorScheme of ['dark', 'light'])
       { colorScheme },
     ));
 
-test('another glTF without transfer vectors is refused as ever', async () => {
-  const other = await startMock({ files: { 'scene.glb': files['scene.glb'] } });
+/// What the page says instead of a picture.
+async function refusal(files) {
+  const other = await startMock({ files });
   try {
     const page = await openPage(browser, other.url + kView);
     await until(page, () => document.querySelector('.overlay .problem') !== null);
-    assert.match(await page.locator('.overlay .problem').innerText(), /no KILN_radiance_transfer/);
+    const text = await page.locator('.overlay .problem').innerText();
+    assert.deepEqual(page.faults, []);
     await page.context().close();
+    return text;
   } finally {
     await other.close();
   }
+}
+
+test('another glTF without transfer vectors is refused as ever', async () =>
+  assert.match(await refusal({ 'scene.glb': files['scene.glb'] }), /no KILN_radiance_transfer/));
+
+test('a model that came back compressed is refused in words', async () => {
+  const { splitGlb, joinGlb } = await load('asset/glb.ts');
+  const bytes = fixture('scene.glb');
+  const { json, binary } = splitGlb(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+  delete json.extensions;
+  const compressed = Buffer.from(joinGlb(json, [binary]));
+  assert.match(await refusal({ ...files, 'scene.glb': compressed }), /compressed with KHR_draco_mesh_compression/);
 });
