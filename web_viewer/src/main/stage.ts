@@ -77,6 +77,7 @@ export class Stage {
   drawNow(): void {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
+    this.fitPlanes();
     const { clientWidth, clientHeight } = this.canvas;
     if (this.drawWith) this.drawWith(clientWidth, clientHeight);
     else this.renderer.render(this.scene, this.camera);
@@ -118,7 +119,6 @@ export class Stage {
     const { center, radius } = this.bounds;
     this.camera.position.set(pose[0], pose[1], pose[2]).multiplyScalar(radius).add(center);
     this.controls.target.set(pose[3], pose[4], pose[5]).multiplyScalar(radius).add(center);
-    this.fitPlanes();
     this.controls.update();
     this.requestDraw();
   }
@@ -131,7 +131,6 @@ export class Stage {
     this.camera.position.copy(center).addScaledVector(direction, radius);
     this.camera.lookAt(center);
     this.camera.position.copy(center).addScaledVector(direction, this.framingDistance());
-    this.fitPlanes();
     this.controls.update();
     this.requestDraw();
   }
@@ -148,9 +147,11 @@ export class Stage {
     return distance;
   }
 
+  /// As near as the model allows: depth is told apart by a near plane's share of the distance, and a contact line is
+  /// where two depths are alike.
   private fitPlanes(): void {
-    const { radius } = this.bounds;
-    this.camera.near = 0.005 * radius;
+    const { center, radius } = this.bounds;
+    this.camera.near = Math.max(0.005 * radius, 0.9 * (this.camera.position.distanceTo(center) - radius));
     this.camera.far = 64 * radius;
     this.camera.updateProjectionMatrix();
   }
