@@ -90,7 +90,7 @@ void decide_preview(Prepared& p, const BakeInput& input) {
   p.preview_bytes = needed;
   const bool own = input.recipe.environment.kind != EnvironmentChoice::Kind::none;
   p.decisions.push_back(
-      {"preview", "path traced", own ? "under the environment of the recipe" : "under a uniform sky"});
+      {"preview", "path traced", own ? "under the environment of the recipe" : "under an overcast sky"});
 }
 
 Result<Prepared> prepare(const BakeInput& input) {
@@ -232,9 +232,7 @@ Result<Bytes> preview_of(const BakeInput& input, const Bytes& glb, const Surface
   put_normal_map(scene, maps);
   const Tracer tracer(scene, threads);
   const auto advance = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
-  if (light) return render_plain_preview(tracer, *light, {.advance = advance}, threads);
-  // Under an even sky reflected light evens out the rest: a white model would show no shape.
-  return render_plain_preview(tracer, constant_sky({1, 1, 1}), {.bounces = 0, .advance = advance}, threads);
+  return render_plain_preview(tracer, light ? *light : overcast_sky(), {.advance = advance}, threads);
 }
 
 /// The reduction alone.

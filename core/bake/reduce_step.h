@@ -2,7 +2,8 @@
 // The `reduce` step: a model of any size becomes a plain glTF of few triangles with a normal map
 // (core/reduce/reduce.h).
 //
-// Result   scene.glb, report.json, log.txt, and preview.png under the job's light or a uniform sky; the plan says when
+// Result   scene.glb, report.json, log.txt, and preview.png under the job's light or an overcast sky; the plan says
+// when
 //          that would not fit into limits.memory_mb, and it is left out. A model that has no more triangles than asked
 //          for comes back unchanged: byte for byte if it is a GLB, else as a GLB of the same triangles.
 // Memory   limits.memory_mb bounds what the process holds; the input is mapped, and what does not fit is put aside in

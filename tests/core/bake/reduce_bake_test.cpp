@@ -85,7 +85,7 @@ std::array<int, 3> middle_of(const BakeOutput& output) {
 TEST(ReduceStep, ShowsAConvexModelUnderAnEvenSkyEvenly) {
   BakeInput input;
   input.scene = {.name = "ball.ply", .main = testing::binary_ply(testing::sphere(40)), .resources = {}};
-  input.recipe = *parse_recipe(R"({"steps":[{"do":"reduce","triangles":100000}]})");
+  input.recipe = *parse_recipe(R"({"steps":[{"do":"reduce","triangles":100000}],"environment":{"builtin":"uniform"}})");
   const auto output = bake_once(input);
   ASSERT_TRUE(output);
   // Nothing shades anything: all of it is the 90th percentile, which displays as 0.8, 231 in sRGB. Vertex normals that
