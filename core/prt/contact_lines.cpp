@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kHair = 0x1p-19;  // unit cube: the height at which rays start (offset_origin)
 constexpr double kFlat = 0.05;     // sine of the angle below which two planes are one: tiles that overlap
-constexpr std::size_t kMostLines = 256;
+constexpr std::size_t kMostLines = 256, kFewestLines = 8, kAllLines = 1U << 22U;  // of a triangle; about so many in all
 
 /// Which triangles share an edge, by position.
 class Neighbours {
@@ -128,6 +128,8 @@ TrianglePlane::TrianglePlane(const Mesh& mesh, const Triangle& t) {
 
 std::vector<ContactLine> find_contact_lines(const Mesh& mesh, const std::vector<bool>& stands, Threads& threads) {
   constexpr std::size_t kBlock = 256;
+  const std::size_t most =
+      std::clamp(kAllLines / std::max<std::size_t>(1, mesh.triangles.size()), kFewestLines, kMostLines);
   const BoxTree tree(mesh);
   const Neighbours neighbours(mesh);
   std::vector<std::vector<ContactLine>> of_block(mesh.triangles.size() / kBlock + 1);
@@ -149,7 +151,7 @@ std::vector<ContactLine> find_contact_lines(const Mesh& mesh, const std::vector<
     });
     const auto key = [](const ContactLine& l) { return std::tuple(-length(l), l.line.a.x, l.line.a.y); };
     std::ranges::sort(lines, {}, key);
-    lines.resize(std::min(lines.size(), kMostLines));
+    lines.resize(std::min(lines.size(), most));
     out.insert(out.end(), lines.begin(), lines.end());
   };
   threads.for_blocks(mesh.triangles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
