@@ -10,6 +10,9 @@ namespace kiln {
 template <class T>
 struct Vec2 {
   T x{}, y{};
+  friend Vec2 operator+(const Vec2& a, const Vec2& b) { return {a.x + b.x, a.y + b.y}; }
+  friend Vec2 operator-(const Vec2& a, const Vec2& b) { return {a.x - b.x, a.y - b.y}; }
+  friend Vec2 operator*(const Vec2& a, T s) { return {a.x * s, a.y * s}; }
   friend bool operator==(const Vec2&, const Vec2&) = default;
 };
 
@@ -40,9 +43,26 @@ struct Vec4 {
 };
 
 using Vec2f = Vec2<float>;
+using Vec2d = Vec2<double>;
 using Vec3f = Vec3<float>;
 using Vec3d = Vec3<double>;
 using Vec4f = Vec4<float>;
+
+template <class T>
+T dot(const Vec2<T>& a, const Vec2<T>& b) {
+  return a.x * b.x + a.y * b.y;
+}
+
+/// Twice the area of the triangle 0, a, b; positive counter-clockwise.
+template <class T>
+T cross(const Vec2<T>& a, const Vec2<T>& b) {
+  return a.x * b.y - a.y * b.x;
+}
+
+template <class T>
+T length(const Vec2<T>& a) {
+  return std::sqrt(dot(a, a));
+}
 
 template <class T>
 T dot(const Vec3<T>& a, const Vec3<T>& b) {

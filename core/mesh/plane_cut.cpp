@@ -6,13 +6,6 @@
 namespace kiln {
 namespace {
 
-Vec2d operator+(const Vec2d& a, const Vec2d& b) { return {a.x + b.x, a.y + b.y}; }
-Vec2d operator-(const Vec2d& a, const Vec2d& b) { return {a.x - b.x, a.y - b.y}; }
-Vec2d operator*(const Vec2d& a, double s) { return {a.x * s, a.y * s}; }
-double dot(const Vec2d& a, const Vec2d& b) { return a.x * b.x + a.y * b.y; }
-double cross(const Vec2d& a, const Vec2d& b) { return a.x * b.y - a.y * b.x; }
-double length(const Vec2d& a) { return std::sqrt(dot(a, a)); }
-
 /// Where p lies beside the way from a to b: along it in its lengths, and off it.
 struct Beside {
   double along, off;

@@ -15,8 +15,6 @@
 
 namespace kiln {
 
-using Vec2d = Vec2<double>;
-
 struct Segment {
   Vec2d a, b;
 };

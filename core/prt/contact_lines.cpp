@@ -72,36 +72,28 @@ std::optional<Segment> trace_of(const TrianglePlane& plane, double side, const s
     end[found] = at(kHair);
     foot[found++] = at(0);
   }
-  const Vec2d way{end[1].x - end[0].x, end[1].y - end[0].y};
-  const double squared = way.x * way.x + way.y * way.y;
+  const Vec2d way = end[1] - end[0];
+  const double squared = dot(way, way);
   if (!(squared > 0)) return std::nullopt;
-  const auto along = [&](const Vec2d& p) { return ((p.x - end[0].x) * way.x + (p.y - end[0].y) * way.y) / squared; };
+  const auto along = [&](const Vec2d& p) { return dot(p - end[0], way) / squared; };
   const double first = std::min(0.0, along(foot[0])), last = std::max(1.0, along(foot[1]));
-  return Segment{{end[0].x + way.x * first, end[0].y + way.y * first},
-                 {end[0].x + way.x * last, end[0].y + way.y * last}};
+  return Segment{end[0] + way * first, end[0] + way * last};
 }
 
 /// The part of a segment inside a triangle that is kSamePlace larger all around.
 std::optional<Segment> clipped(const Segment& s, const std::array<Vec2d, 3>& corner) {
   double first = 0, last = 1;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vec2d &p = corner[k], &q = corner[(k + 1) % 3];
-    const Vec2d way{q.x - p.x, q.y - p.y};
-    const double size = std::hypot(way.x, way.y);
-    const auto inside = [&](const Vec2d& at) {
-      return (way.x * (at.y - p.y) - way.y * (at.x - p.x)) / size + 0.5 * kSamePlace;
-    };
+    const Vec2d way = corner[(k + 1) % 3] - corner[k];
+    const auto inside = [&](const Vec2d& at) { return cross(way, at - corner[k]) / length(way) + 0.5 * kSamePlace; };
     const double a = inside(s.a), b = inside(s.b);
     if (a < 0 && b < 0) return std::nullopt;
     if (a < 0) first = std::max(first, a / (a - b));
     if (b < 0) last = std::min(last, a / (a - b));
   }
   if (first >= last) return std::nullopt;
-  const auto at = [&](double t) { return Vec2d{s.a.x + (s.b.x - s.a.x) * t, s.a.y + (s.b.y - s.a.y) * t}; };
-  return Segment{at(first), at(last)};
+  return Segment{s.a + (s.b - s.a) * first, s.a + (s.b - s.a) * last};
 }
-
-double length(const Segment& s) { return std::hypot(s.b.x - s.a.x, s.b.y - s.a.y); }
 
 /// The side of a triangle towards which its vertices' normals point.
 double lit_side(const Mesh& mesh, const Triangle& t, const TrianglePlane& plane) {
@@ -109,14 +101,13 @@ double lit_side(const Mesh& mesh, const Triangle& t, const TrianglePlane& plane)
 }
 
 bool is_too_small(const std::array<Vec2d, 3>& corner) {
-  const Vec2d &b = corner[1], &c = corner[2];
-  const double longest = std::max({b.x, std::hypot(c.x, c.y), std::hypot(c.x - b.x, c.y)});
-  return !(b.x * c.y > 16 * kSamePlace * longest);  // its smallest height
+  const Vec2d b = corner[1] - corner[0], c = corner[2] - corner[0];
+  return !(cross(b, c) > 16 * kSamePlace * std::max({length(b), length(c), length(c - b)}));  // its smallest height
 }
 
 }  // namespace
 
-double length(const ContactLine& c) { return length(c.line); }
+double length(const ContactLine& c) { return length(c.line.b - c.line.a); }
 
 TrianglePlane::TrianglePlane(const Mesh& mesh, const Triangle& t) {
   const auto [a, b, c] = corners(mesh, t);
@@ -132,6 +123,8 @@ std::vector<ContactLine> find_contact_lines(const Mesh& mesh, const std::vector<
       std::clamp(kAllLines / std::max<std::size_t>(1, mesh.triangles.size()), kFewestLines, kMostLines);
   const BoxTree tree(mesh);
   const Neighbours neighbours(mesh);
+  const auto a_hair = static_cast<float>(kHair);
+  const Vec3f hair{a_hair, a_hair, a_hair};
   std::vector<std::vector<ContactLine>> of_block(mesh.triangles.size() / kBlock + 1);
 
   const auto find = [&](std::uint32_t index, std::vector<ContactLine>& out) {
@@ -142,11 +135,14 @@ std::vector<ContactLine> find_contact_lines(const Mesh& mesh, const std::vector<
     if (is_too_small(corner)) return;
     const double side = lit_side(mesh, t, plane);
     std::vector<ContactLine> lines;
-    tree.overlapping(triangle_box(mesh, t), [&](std::uint32_t other) {
+    Box near = triangle_box(mesh, t);
+    near.add(near.low - hair);
+    near.add(near.high + hair);
+    tree.overlapping(near, [&](std::uint32_t other) {
       if (other == index || !stands[other]) return;
       const auto trace = trace_of(plane, side, corners(mesh, mesh.triangles[other]));
       const auto line = trace ? clipped(*trace, corner) : std::nullopt;
-      if (line && length(*line) > 2 * kSamePlace && !neighbours.fold(t, mesh.triangles[other]))
+      if (line && length(line->b - line->a) > 2 * kSamePlace && !neighbours.fold(t, mesh.triangles[other]))
         lines.push_back({index, *line});
     });
     const auto key = [](const ContactLine& l) { return std::tuple(-length(l), l.line.a.x, l.line.a.y); };
@@ -167,14 +163,12 @@ std::array<TransferPoint, 2> beside_line(const Mesh& mesh, const ContactLine& co
   const Triangle& t = mesh.triangles[contact.triangle];
   const TrianglePlane plane(mesh, t);
   const Segment& s = contact.line;
-  const double size = length(s);
-  const Vec2d middle{0.5 * (s.a.x + s.b.x), 0.5 * (s.a.y + s.b.y)};
-  const Vec2d off{-kClear * (s.b.y - s.a.y) / size, kClear * (s.b.x - s.a.x) / size};
+  const Vec2d middle = (s.a + s.b) * 0.5, along = (s.b - s.a) * (kClear / length(contact));
+  const Vec2d off{-along.y, along.x};
   const Vec3f face = to_float(plane.z * lit_side(mesh, t, plane));
   std::array<TransferPoint, 2> out;
   for (std::size_t k = 0; k < 2; ++k) {
-    const double sign = k == 0 ? -1 : 1;
-    const Vec3f at = to_float(plane.in_space({middle.x + sign * off.x, middle.y + sign * off.y}));
+    const Vec3f at = to_float(plane.in_space(middle + off * (k == 0 ? -1 : 1)));
     out[k] = {.position = at, .normal = face, .inward = at, .face_normal = face};
   }
   return out;

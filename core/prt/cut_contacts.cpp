@@ -165,9 +165,7 @@ class ContactCutter {
 
   std::uint32_t vertex_inside(Mesh& out, const CutFace& face, const Vec2d& at) const {
     const auto& p = face.cut.points();
-    const auto area = [](const Vec2d& a, const Vec2d& b, const Vec2d& c) {
-      return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    };
+    const auto area = [](const Vec2d& a, const Vec2d& b, const Vec2d& c) { return cross(b - a, c - a); };
     const double whole = area(p[0], p[1], p[2]);
     return append_inside(out, mesh_.triangles[face.triangle], static_cast<float>(area(p[0], at, p[2]) / whole),
                          static_cast<float>(area(p[0], p[1], at) / whole));
