@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/bake/direct_source.h"
 #include "core/bake/lightings.h"
 #include "core/bake/plan.h"
 #include "core/bake/surface_samples.h"

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/bake/direct_source.h"
 #include "core/bake/surface_samples.h"
 #include "core/bake/transport.h"
 #include "core/base/random.h"
@@ -15,8 +16,6 @@
 
 namespace kiln {
 namespace {
-
-constexpr float kOpenConstantBand = 0.2820948F;  // what thresholds of the split measure are relative to (transport.cpp)
 
 /// What the qualities spend. The error that each is for was measured with core/meshless on the shared references.
 struct RadiosityEffort {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/bake/direct_source.h"
 #include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
@@ -14,108 +15,6 @@
 
 namespace kiln {
 namespace {
-
-/// Direct light of both kinds at points. Lamps ride ahead as four more columns (RGB and nothing: a four of their own in
-/// row_store.h), scaled so that a typical lamp value weighs as much in the split measure as the constant band of an
-/// open point.
-class DirectSource {
- public:
-  DirectSource(const Tracer& tracer, const Plan& plan, const DirectTransfer& sky, BakeLog& log, Threads& threads)
-      : tracer_(tracer),
-        log_(log),
-        sky_(tracer, sky),
-        rough_sky_(tracer, rough(sky)),
-        plan_(plan),
-        seed_(sky.seed),
-        threads_(threads),
-        lamp_scale_(plan.lamps ? measure_lamp_scale() : 1) {}
-
-  std::size_t lamp_columns() const { return plan_.lamps ? 4 : 0; }
-  std::size_t bands() const { return static_cast<std::size_t>(sh_count(plan_.order)); }
-  std::size_t width() const { return lamp_columns() + bands(); }
-
-  /// Lamp light and the constant band stay within what was sampled: no vertex is darker than black.
-  ValueSource source() {
-    ValueSource s{
-        .width = width(),
-        .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
-        .bounded = {lamp_columns()},
-        .hidden = hidden_test(tracer_),
-        .rough =
-            [this](std::span<const TransferPoint> batch) {
-              return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));
-            }};
-    if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
-    return s;
-  }
-
-  std::vector<float> light(std::span<const TransferPoint> batch, const DirectTransferBaker& baker, int lamp_samples) {
-    points += batch.size();
-    log_.advance(std::min(points, expected_points()), expected_points());
-    std::vector<float> sky = baker.bake(batch, threads_, &stats);
-    if (!plan_.lamps) return sky;
-    const std::vector<Vec3f> lamps =
-        bake_fixed_direct(tracer_, batch, {.samples = lamp_samples, .seed = seed_}, threads_, &stats);
-    return join(sky, lamps);
-  }
-
-  /// Takes the joined columns apart again.
-  void separate(const std::vector<float>& joined, std::vector<float>& sky, std::vector<Vec3f>& lamps) const {
-    const std::size_t points = joined.size() / width();
-    sky.resize(points * bands());
-    lamps.resize(plan_.lamps ? points : 0);
-    for (std::size_t p = 0; p < points; ++p) {
-      const float* row = joined.data() + p * width();
-      std::copy_n(row + lamp_columns(), bands(), sky.data() + p * bands());
-      if (plan_.lamps) lamps[p] = Vec3f{row[0], row[1], row[2]} / lamp_scale_;
-    }
-  }
-
-  TransferStats stats;
-  std::uint64_t points = 0;  // asked for so far
-
- private:
-  static DirectTransfer rough(DirectTransfer sky) {
-    sky.samples = std::max(16, sky.samples / kRoughRays);
-    return sky;
-  }
-  static constexpr float kOpenConstantBand = 0.2820948F;  // t_0 of an unoccluded point: Y(0,0)
-
-  /// From about a thousand vertices spread over the input, whatever batches will be asked for.
-  float measure_lamp_scale() {
-    const std::vector<TransferPoint> all = vertex_points(tracer_.scene().mesh);
-    std::vector<TransferPoint> some;
-    for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
-    double sum = 0;
-    for (const Vec3f& x : bake_fixed_direct(tracer_, some, {.samples = plan_.lamp_samples, .seed = seed_}, threads_))
-      sum += x.x + x.y + x.z;
-    const double mean = some.empty() ? 0 : sum / (3.0 * static_cast<double>(some.size()));
-    return mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
-  }
-
-  std::vector<float> join(const std::vector<float>& sky, const std::vector<Vec3f>& lamps) const {
-    std::vector<float> joined(lamps.size() * width(), 0.0F);
-    for (std::size_t p = 0; p < lamps.size(); ++p) {
-      float* row = joined.data() + p * width();
-      for (std::size_t c = 0; c < 3; ++c) row[c] = lamps[p][c] * lamp_scale_;
-      std::copy_n(sky.data() + p * bands(), bands(), row + lamp_columns());
-    }
-    return joined;
-  }
-
-  /// Subdivision asks for three points a final triangle, unless its threshold ends it early.
-  std::uint64_t expected_points() const {
-    return plan_.split ? 3 * plan_.subdivide.triangles : tracer_.scene().mesh.position.size();
-  }
-
-  const Tracer& tracer_;
-  BakeLog& log_;
-  DirectTransferBaker sky_, rough_sky_;
-  const Plan& plan_;
-  std::uint64_t seed_;
-  Threads& threads_;
-  float lamp_scale_;
-};
 
 /// Reflected light varies where direct light does not (a ceiling above a lamp), and the split measure sees direct light
 /// only. So a quarter of the new triangles first goes to the longest triangles: with positions as values, eq. 3 is a
@@ -210,7 +109,7 @@ GlossyBaked bake_matrices(const Tracer& tracer, const Transfer& transfer, const 
 }
 
 void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
-  if (plan.bounces == 0 || source.stats.open_points < source.points) return;
+  if (plan.bounces == 0 || source.stats().open_points < source.points()) return;
   plan.bounces = 0;
   for (Decision& d : plan.decisions) {
     if (d.decision == "bounces")
@@ -226,23 +125,6 @@ Mesh base_mesh(const Scene& scene, const Plan& plan, const ValueSource& source, 
   return bounces ? split_longest(cut, plan, threads) : cut;
 }
 
-DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
-                        std::uint64_t seed, Threads& threads) {
-  constexpr int kPilot = 64;
-  DirectTransfer out{.order = plan.order, .samples = plan.samples, .seed = seed};
-  if (!(plan.noise > 0)) return out;
-  const std::vector<TransferPoint> all = vertex_points(tracer.scene().mesh);
-  std::vector<TransferPoint> some;
-  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
-  double mean = 0;
-  for (const float t : bake_direct_transfer(tracer, some, {.order = 1, .samples = kPilot, .seed = seed}, threads))
-    mean += 2 * std::sqrt(M_PI) * t / static_cast<double>(some.size());
-  // Interpolation halves the variance of what vertices have.
-  out.tolerance = static_cast<float>(std::sqrt(2.0) * plan.noise * std::max(mean, 0.01));
-  for (const double p : band_power) out.band_power.push_back(static_cast<float>(p));
-  return out;
-}
-
 Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& band_power, std::uint64_t seed,
                           BakeLog& log, Threads& threads) {
   std::vector<float> sky;
@@ -254,11 +136,11 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
     const DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
-    DirectSource source(tracer, plan, rays, log, threads);
+    DirectSource source(tracer, plan, rays, band_power, log, threads);
     Subdivided direct = bake_direct(scene, plan, source, threads);
     source.separate(direct.values, sky, lamps);
     stand_ins = std::move(direct.stand_ins);
-    log.count_rays(source.stats.rays);
+    log.count_rays(source.stats().rays);
     skip_bounces_of_open_scene(plan, source);
     out.noise.vertices = choose_probes(direct.mesh);
     direct_noise = draw_twice(tracer, points_at(direct.mesh, out.noise.vertices), plan, rays, threads);

@@ -27,13 +27,6 @@ struct Transport {
   GlossyBaked glossy;  // as planned
 };
 
-inline constexpr int kRoughRays = 4;  // so many times fewer for points that only tell where to split
-
-/// How the rays for distant light are spent: each point to the noise of the plan, relative to the mean light of about a
-/// thousand vertices.
-DirectTransfer sky_rays(const Tracer&, const Plan&, const std::vector<double>& band_power, std::uint64_t seed,
-                        Threads&);
-
 /// The mesh that subdivision starts from. At most half of the new triangles go to contact lines where the light of
 /// `source` jumps; with `bounces` a quarter of the rest to the longest triangles, since reflected light varies where
 /// direct light does not.
