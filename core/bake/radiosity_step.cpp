@@ -221,7 +221,7 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
                              .bounded = {0, 1, 2},
                              .hidden = hidden_test(tracer),
                              .rough = [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
-    const Mesh base = plan.split ? base_mesh(scene, plan, source, params.bounces != 0, threads) : scene.mesh;
+    const Mesh base = plan.split ? base_mesh(tracer, plan, source, params.bounces != 0, threads) : scene.mesh;
     Subdivide split = plan.subdivide;
     if (!plan.split) split = {.triangles = 0};
     Subdivided fine = subdivide(base, source, split, threads);

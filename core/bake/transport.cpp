@@ -8,7 +8,7 @@
 #include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
-#include "core/prt/cut_contacts.h"
+#include "core/prt/cut_lines.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/interreflection.h"
 #include "core/trace/tracer.h"
@@ -37,10 +37,10 @@ Mesh split_longest(const Mesh& mesh, const Plan& plan, Threads& threads) {
 }
 
 /// The mesh to light and the joined columns of direct light at its vertices.
-Subdivided bake_direct(const Scene& scene, const Plan& plan, DirectSource& source, Threads& threads) {
-  if (!plan.split) return subdivide(scene.mesh, source.source(), {.triangles = 0}, threads);
+Subdivided bake_direct(const Tracer& tracer, const Plan& plan, DirectSource& source, Threads& threads) {
+  if (!plan.split) return subdivide(tracer.scene().mesh, source.source(), {.triangles = 0}, threads);
   const ValueSource light = source.source();
-  return subdivide(base_mesh(scene, plan, light, plan.bounces > 0, threads), light, plan.subdivide, threads);
+  return subdivide(base_mesh(tracer, plan, light, plan.bounces > 0, threads), light, plan.subdivide, threads);
 }
 
 constexpr std::size_t kProbes = 256;
@@ -119,9 +119,10 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
 
 }  // namespace
 
-Mesh base_mesh(const Scene& scene, const Plan& plan, const ValueSource& source, bool bounces, Threads& threads) {
-  const std::uint64_t input = scene.mesh.triangles.size(), budget = input + (plan.subdivide.triangles - input) / 2;
-  const Mesh cut = cut_where_light_jumps(scene, source, budget, threads);
+Mesh base_mesh(const Tracer& tracer, const Plan& plan, const ValueSource& source, bool bounces, Threads& threads) {
+  const std::uint64_t input = tracer.scene().mesh.triangles.size(),
+                      budget = input + (plan.subdivide.triangles - input) / 2;
+  const Mesh cut = cut_where_light_jumps(tracer, source, budget, threads);
   return bounces ? split_longest(cut, plan, threads) : cut;
 }
 
@@ -137,7 +138,7 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
     const Tracer tracer(scene, threads);
     const DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
     DirectSource source(tracer, plan, rays, band_power, log, threads);
-    Subdivided direct = bake_direct(scene, plan, source, threads);
+    Subdivided direct = bake_direct(tracer, plan, source, threads);
     source.separate(direct.values, sky, lamps);
     stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats().rays);

@@ -27,10 +27,10 @@ struct Transport {
   GlossyBaked glossy;  // as planned
 };
 
-/// The mesh that subdivision starts from. At most half of the new triangles go to contact lines where the light of
-/// `source` jumps; with `bounces` a quarter of the rest to the longest triangles, since reflected light varies where
-/// direct light does not.
-Mesh base_mesh(const Scene&, const Plan&, const ValueSource& source, bool bounces, Threads&);
+/// The mesh that subdivision starts from. At most half of the new triangles go to lines where the light of `source`
+/// jumps (core/prt/cut_lines.h); with `bounces` a quarter of the rest to the longest triangles, since reflected light
+/// varies where direct light does not.
+Mesh base_mesh(const Tracer&, const Plan&, const ValueSource& source, bool bounces, Threads&);
 
 /// Refines scene.mesh as planned and solves for light at its vertices. What the measurements show to be needless is
 /// skipped and added to plan.decisions with its reason.

@@ -1,4 +1,4 @@
-#include "core/prt/cut_contacts.h"
+#include "core/prt/cut_lines.h"
 
 #include <algorithm>
 #include <array>
@@ -13,6 +13,8 @@
 #include "core/mesh/midpoint.h"
 #include "core/mesh/part_vertices.h"
 #include "core/mesh/topology.h"
+#include "core/prt/contact_lines.h"
+#include "core/prt/shadow_lines.h"
 
 namespace kiln {
 namespace {
@@ -26,13 +28,9 @@ struct CutFace {
   PlaneCut cut;
 
   CutFace(const Mesh& mesh, std::uint32_t index)
-      : triangle(index), plane(mesh, mesh.triangles[index]), cut(flat_corners(mesh, index, plane), kSamePlace) {}
-
-  static std::array<Vec2d, 3> flat_corners(const Mesh& mesh, std::uint32_t index, const TrianglePlane& plane) {
-    std::array<Vec2d, 3> out;
-    for (std::size_t k = 0; k < 3; ++k) out[k] = plane.flat(to_double(mesh.position[mesh.triangles[index][k]]));
-    return out;
-  }
+      : triangle(index),
+        plane(mesh, mesh.triangles[index]),
+        cut(flat_corners(mesh, mesh.triangles[index], plane), kSamePlace) {}
 };
 
 /// An edge of a triangle, from the lower to the higher welded place.
@@ -51,13 +49,13 @@ struct EdgePoint {
   std::size_t border;  // of its cut's border points
 };
 
-class ContactCutter {
+class Cutter {
  public:
-  ContactCutter(const Mesh& mesh, std::span<const ContactLine> lines, Threads& threads)
+  Cutter(const Mesh& mesh, std::span<const CutLine> lines, Threads& threads)
       : mesh_(mesh), place_(weld_by_position(mesh.position)), face_of_(mesh.triangles.size(), kNone) {
-    for (const ContactLine& c : lines) face_at(c.triangle);
+    for (const CutLine& c : lines) face_at(c.triangle);
     std::vector<std::vector<Segment>> of_face(faces_.size());
-    for (const ContactLine& c : lines) of_face[face_of_[c.triangle]].push_back(c.line);
+    for (const CutLine& c : lines) of_face[face_of_[c.triangle]].push_back(c.line);
     threads.for_blocks(faces_.size(), 16, [&](std::size_t begin, std::size_t end) {
       for (std::size_t f = begin; f < end; ++f) {
         for (const Segment& s : of_face[f]) faces_[f].cut.cut(s);
@@ -215,7 +213,7 @@ std::vector<bool> opaque_triangles(const Scene& scene) {
 /// Of each line: the square of the change of light across it, times the area that an uncut triangle would spread it
 /// over (the line's length times the size of the triangle). Reflected light, which is not known yet, may change as
 /// well.
-std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines, const ValueSource& source) {
+std::vector<double> worths(const Mesh& mesh, std::span<const CutLine> lines, const ValueSource& source) {
   constexpr std::size_t kBatch = 1024;
   constexpr double kReflected = 1e-4;  // square of what it may change by: a thirtieth of an open point's constant band
   std::vector<double> out;
@@ -224,7 +222,7 @@ std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines,
   for (std::size_t begin = 0; begin < lines.size(); begin += kBatch) {
     const auto batch = lines.subspan(begin, std::min(kBatch, lines.size() - begin));
     points.clear();
-    for (const ContactLine& line : batch) {
+    for (const CutLine& line : batch) {
       for (const TransferPoint& p : beside_line(mesh, line)) points.push_back(p);
     }
     const std::vector<float> values = source.rough ? source.rough(points) : source.values(points);
@@ -240,8 +238,8 @@ std::vector<double> worths(const Mesh& mesh, std::span<const ContactLine> lines,
 }
 
 /// The lines at which somebody can see one of the two sides.
-std::vector<ContactLine> seen_lines(const Mesh& mesh, std::vector<ContactLine> lines, const HiddenTest& hidden,
-                                    Threads& threads) {
+std::vector<CutLine> seen_lines(const Mesh& mesh, std::vector<CutLine> lines, const HiddenTest& hidden,
+                                Threads& threads) {
   if (!hidden) return lines;
   std::vector<char> seen(lines.size());
   threads.for_blocks(lines.size(), 64, [&](std::size_t begin, std::size_t end) {
@@ -250,28 +248,31 @@ std::vector<ContactLine> seen_lines(const Mesh& mesh, std::vector<ContactLine> l
       seen[i] = !hidden(one) || !hidden(other) ? 1 : 0;
     }
   });
-  std::erase_if(lines,
-                [&](const ContactLine& line) { return seen[static_cast<std::size_t>(&line - lines.data())] == 0; });
+  std::erase_if(lines, [&](const CutLine& line) { return seen[static_cast<std::size_t>(&line - lines.data())] == 0; });
   return lines;
 }
 
 }  // namespace
 
-Mesh cut_where_light_jumps(const Scene& scene, const ValueSource& source, std::uint64_t budget, Threads& threads) {
-  const std::vector<ContactLine> lines =
-      seen_lines(scene.mesh, find_contact_lines(scene.mesh, opaque_triangles(scene), threads), source.hidden, threads);
+Mesh cut_where_light_jumps(const Tracer& tracer, const ValueSource& source, std::uint64_t budget, Threads& threads) {
+  const Scene& scene = tracer.scene();
+  const std::vector<bool> opaque = opaque_triangles(scene);
+  std::vector<CutLine> lines = find_contact_lines(scene.mesh, opaque, threads);
+  const std::vector<CutLine> shadows = find_shadow_lines(tracer, opaque, threads);
+  lines.insert(lines.end(), shadows.begin(), shadows.end());
+  lines = seen_lines(scene.mesh, std::move(lines), source.hidden, threads);
   const std::vector<double> worth = worths(scene.mesh, lines, source);
   std::vector<std::uint32_t> order(lines.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, std::greater{}, [&](std::uint32_t i) { return worth[i]; });
-  std::vector<ContactLine> sorted;
+  std::vector<CutLine> sorted;
   for (const std::uint32_t i : order) sorted.push_back(lines[i]);
-  return cut_contacts(scene.mesh, sorted, budget, threads);
+  return cut_along(scene.mesh, sorted, budget, threads);
 }
 
-Mesh cut_contacts(const Mesh& mesh, std::span<const ContactLine> lines, std::uint64_t budget, Threads& threads) {
+Mesh cut_along(const Mesh& mesh, std::span<const CutLine> lines, std::uint64_t budget, Threads& threads) {
   while (!lines.empty()) {
-    Mesh out = ContactCutter(mesh, lines, threads).run();
+    Mesh out = Cutter(mesh, lines, threads).run();
     if (out.triangles.size() <= budget) return out;
     const double share = static_cast<double>(budget - std::min<std::uint64_t>(budget, mesh.triangles.size())) /
                          static_cast<double>(out.triangles.size() - mesh.triangles.size());

@@ -1,4 +1,4 @@
-#include "core/prt/cut_contacts.h"
+#include "core/prt/cut_lines.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/prt/contact_lines.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/subdivide.h"
 #include "tests/core/prt/test_scenes.h"
@@ -34,7 +35,7 @@ Subdivided refine(const Scene& scene, std::uint64_t triangles, bool cut, Threads
                            .values = [&](std::span<const TransferPoint> p) { return baker.bake(p, threads); },
                            .bounded = {0},
                            .hidden = hidden_test(tracer)};
-  const Mesh base = cut ? cut_where_light_jumps(scene, source, triangles, threads) : scene.mesh;
+  const Mesh base = cut ? cut_where_light_jumps(tracer, source, triangles, threads) : scene.mesh;
   return subdivide(base, source, {.triangles = triangles}, threads);
 }
 
@@ -73,7 +74,7 @@ double error_at_the_foot(int cells, bool double_sided, bool cut) {
 
 // What is left is noise of 1024 rays (.02 of a half-open point) and what a triangle cannot follow at the corners of the
 // box: measured .026 and .042. Without cuts it is .86 or more.
-TEST(CutContacts, LightStopsAtTheFootOfABox) {
+TEST(CutLines, LightStopsAtTheFootOfABox) {
   for (const int cells : {10, 11}) {
     for (const bool double_sided : {false, true}) {
       const double with = error_at_the_foot(cells, double_sided, true);
@@ -107,7 +108,7 @@ std::vector<std::pair<Vec3f, Vec3f>> odd_edges(const Mesh& mesh) {
 bool on_the_rim(const Vec3f& p) { return p.y == 0 && std::max(std::abs(p.x), std::abs(p.z)) == 0.5F; }
 
 // A hanging vertex has three odd edges about it. The rim of the floor is all that is open here.
-TEST(CutContacts, CutsLeaveNoCrackAndKeepTheBudget) {
+TEST(CutLines, CutsLeaveNoCrackAndKeepTheBudget) {
   Threads threads(2);
   for (const int cells : {10, 11}) {
     const Scene scene = box_in_floor(cells, false);
@@ -123,7 +124,7 @@ TEST(CutContacts, CutsLeaveNoCrackAndKeepTheBudget) {
   }
 }
 
-TEST(CutContacts, AMeshThatNothingStandsOnIsLeftAlone) {
+TEST(CutLines, AMeshThatNothingStandsOnIsLeftAlone) {
   Threads threads(2);
   Scene scene = testing::empty_scene();
   testing::add_sphere(scene, {0, 0, 0}, 0.4F, 24);
@@ -137,14 +138,14 @@ bool faces_up(const Mesh& mesh, const Triangle& t) {
 }
 
 /// Two walls that cross on a floor, each of two triangles and upright, thin as they are: the floor falls into four.
-TEST(CutContacts, CrossedWallsPartTheFloorIntoFour) {
+TEST(CutLines, CrossedWallsPartTheFloorIntoFour) {
   Threads threads(1);
   Scene scene = testing::empty_scene();
   testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
   testing::add_grid(scene, {-0.6F, 0, 0.1F}, {1.2F, 0, 0}, {0, 0.3F, 0}, 1, 1);
   testing::add_grid(scene, {0.2F, 0, -0.6F}, {0, 0, 1.2F}, {0, 0.3F, 0}, 1, 1);
   const auto lines = find_contact_lines(scene.mesh, std::vector<bool>(6, true), threads);
-  const Mesh cut = cut_contacts(scene.mesh, lines, 1000, threads);
+  const Mesh cut = cut_along(scene.mesh, lines, 1000, threads);
   std::map<std::pair<bool, bool>, double> area;  // of the floor, by side of the walls
   for (const Triangle& t : cut.triangles) {
     if (!faces_up(cut, t)) continue;
@@ -170,13 +171,13 @@ TEST(CutContacts, CrossedWallsPartTheFloorIntoFour) {
 }
 
 /// A line that ends inside a face leaves the surface whole around its end.
-TEST(CutContacts, AWallThatEndsInsideAFloorSharesTheVertexAtItsEnd) {
+TEST(CutLines, AWallThatEndsInsideAFloorSharesTheVertexAtItsEnd) {
   Threads threads(1);
   Scene scene = testing::empty_scene();
   testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
   testing::add_grid(scene, {-0.6F, 0, 0.1F}, {0.8F, 0, 0}, {0, 0.3F, 0}, 1, 1);
   const auto lines = find_contact_lines(scene.mesh, std::vector<bool>(4, true), threads);
-  const Mesh cut = cut_contacts(scene.mesh, lines, 1000, threads);
+  const Mesh cut = cut_along(scene.mesh, lines, 1000, threads);
   std::map<float, int> copies;  // of the places on the line, by x
   for (const Vec3f& p : cut.position) {
     if (p.y == 0 && std::abs(p.z - 0.1F) < 1e-5F) ++copies[std::round(p.x * 1000) / 1000];
@@ -185,7 +186,7 @@ TEST(CutContacts, AWallThatEndsInsideAFloorSharesTheVertexAtItsEnd) {
   EXPECT_EQ(copies[0.2F], 2);   // one of the floor, one of the wall
 }
 
-TEST(CutContacts, TilesThatOverlapInOnePlaneMakeNoLines) {
+TEST(CutLines, TilesThatOverlapInOnePlaneMakeNoLines) {
   Threads threads(1);
   Scene scene = testing::empty_scene();
   testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
@@ -193,7 +194,7 @@ TEST(CutContacts, TilesThatOverlapInOnePlaneMakeNoLines) {
   EXPECT_TRUE(find_contact_lines(scene.mesh, std::vector<bool>(4, true), threads).empty());
 }
 
-TEST(CutContacts, SameBitsForAnyNumberOfThreads) {
+TEST(CutLines, SameBitsForAnyNumberOfThreads) {
   Threads one(1), two(2);
   const Scene scene = box_in_floor(11, true);
   const Subdivided a = refine(scene, 2000, true, one), b = refine(scene, 2000, true, two);
