@@ -39,6 +39,7 @@ void plan_order(Plan& plan, const PrtStep& step, const Effort& effort) {
 void plan_bounces(Plan& plan, const Tracer& tracer, const PrtStep& step, const Effort& effort, Threads& threads) {
   if (step.bounces) {
     plan.bounces = *step.bounces;
+    plan.bounces_asked = true;
     return decide(plan, "bounces", std::to_string(plan.bounces), kAsked);
   }
   const BounceTail tail = measure_bounces(tracer, plan.lamps, effort.tail, threads);

@@ -27,13 +27,14 @@ struct Decision {
 struct Plan {
   int order = 6;
   int bounces = 0;
-  double tail_left = 0;      // share of the light in later reflections; 0 where the recipe says how many
-  int samples = 1024;        // most rays per point for distant light
-  double noise = 0;          // relRMSE of these rays at which a point stops; 0: never
-  int bounce_samples = 256;  // rays per vertex and bounce
-  int lamp_samples = 64;     // shadow rays per point over all emitters
-  bool lamps = false;        // the scene has light of its own
-  bool split = false;        // subdivide at all
+  bool bounces_asked = false;  // by the recipe: then never skipped
+  double tail_left = 0;        // share of the light in later reflections; 0 where the recipe says how many
+  int samples = 1024;          // most rays per point for distant light
+  double noise = 0;            // relRMSE of these rays at which a point stops; 0: never
+  int bounce_samples = 256;    // rays per vertex and bounce
+  int lamp_samples = 64;       // shadow rays per point over all emitters
+  bool lamps = false;          // the scene has light of its own
+  bool split = false;          // subdivide at all
   Subdivide subdivide;
   PrtStep::Encoding encoding;
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open

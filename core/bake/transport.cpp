@@ -109,7 +109,7 @@ GlossyBaked bake_matrices(const Tracer& tracer, const Transfer& transfer, const 
 }
 
 void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
-  if (plan.bounces == 0 || source.stats().open_points < source.points()) return;
+  if (plan.bounces == 0 || plan.bounces_asked || source.stats().open_points < source.points()) return;
   plan.bounces = 0;
   for (Decision& d : plan.decisions) {
     if (d.decision == "bounces")
