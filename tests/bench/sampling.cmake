@@ -1,0 +1,5 @@
+if(TARGET kiln_bake AND TARGET kiln_client)
+  add_executable(kiln_sampling sampling.cpp)
+  kiln_flags(kiln_sampling)
+  target_link_libraries(kiln_sampling PRIVATE kiln_client kiln_bake nlohmann_json::nlohmann_json)
+endif()
