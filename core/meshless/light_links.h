@@ -5,9 +5,9 @@
 //   (T x)_r = sum over the links of row r of value x[node]                                                          (3)
 //   x = e + T x, `sweeps` times from x = e, then x += tail (x - x before the last sweep)                            (4)
 //   reflected(r, n') = max(0, sum over the links of r of value (1 + n' . aside) x[node])                            (5)
-// Rows 0 .. senders - 1 are those of the senders themselves, the others are more receivers. Aside is at right angles to
-// the row's own normal: read with that, (5) is (3).
-// Paper   Lehtinen et al. 2007, section 6.5.   Differs  the paper stores powers of T. One power of T is sparse, the sum
+// Rows 0 .. senders - 1 are those of the senders themselves, the others are the receivers that vertices read. Aside is
+// at right angles to the row's own normal: read with that, (5) is (3). Paper   Lehtinen et al. 2007, section 6.5.
+// Differs  the paper stores powers of T. One power of T is sparse, the sum
 //         of all is not: so T alone is stored, and its powers are applied one after the other, among the senders only.
 // Stored  as delivered: value = scale of the row x value / 255, where what rounding leaves over is carried from link to
 //         link, so that a row's sum is right to half a step; aside = aside / 16; share = share / sum over its children.

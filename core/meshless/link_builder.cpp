@@ -14,7 +14,8 @@
 namespace kiln {
 namespace {
 
-constexpr std::size_t kBlock = 128, kShareBlock = 1024;
+constexpr std::size_t kBlock = 128, kShareBlock = 512;
+constexpr std::uint32_t kUnread = 0xffffffffU;
 constexpr double kMostUnsteady = 0.9;  // factor that is believed when it has not become steady
 constexpr float kChildReach = 2;       // of the parent level's R
 
@@ -60,7 +61,8 @@ struct LinkBuilder::Work {
   std::optional<SenderPaths> paths;
   std::optional<GatherRows> rows, lone_rows;
   SenderTree tree;
-  std::vector<std::uint32_t> receiver;   // the point of each row
+  std::vector<std::uint32_t> receiver;   // the point of each gathered row
+  std::vector<std::uint32_t> link_row;   // of each gathered row: the row of links that vertices read, or kUnread
   std::vector<std::vector<Vec3f>> lamp;  // of each probe: light at the senders, all reflections
   std::vector<Vec3f> gathered;           // [row * probes + probe]: what one more reflection brings
   std::vector<float> limit;              // of each probe
@@ -110,7 +112,8 @@ struct LinkBuilder::Work {
     refine(threads);
   }
 
-  /// Traces rows of points and makes their links.
+  /// Traces rows of points and makes their links: of senders coarse ones for the sweeps, and fine ones for whoever
+  /// reads those that stand on the side of the vertex normals.
   void gather(const std::vector<std::uint32_t>& points, Threads& threads) {
     std::vector<TransferPoint> places;
     for (const std::uint32_t p : points) {
@@ -119,46 +122,78 @@ struct LinkBuilder::Work {
     }
     const std::size_t first = rows->size();
     rows->add(places, false, threads, stats.rays);
-    if (first == 0) weigh_shares(places, threads);
-    make_links(*rows, first, places, threads);
-    for (const std::uint32_t p : points) {
-      const auto level = std::upper_bound(all.level_end.begin(), all.level_end.end(), p) - all.level_end.begin();
-      add_site(all.points[p].site, static_cast<std::uint8_t>(level));
-      stats.gathered.resize(std::max(stats.gathered.size(), static_cast<std::size_t>(level) + 1));
-      ++stats.gathered[static_cast<std::size_t>(level)];
+    std::vector<std::uint32_t> every(points.size());
+    for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
+    if (first == 0) {
+      link_senders({*rows, first, places, params.sender_oracle, every}, threads);
+      for (const std::uint32_t p : points) add_site(all.points[p].site, level_of(p));
     }
+    std::vector<std::uint32_t> read;
+    link_row.resize(receiver.size(), kUnread);
+    for (const std::uint32_t i : every) {
+      if (all.points[points[i]].behind) continue;
+      link_row[first + i] = static_cast<std::uint32_t>(links.rows() + read.size());
+      read.push_back(i);
+    }
+    make_links({*rows, first, places, params.oracle, read}, threads);
+    for (const std::uint32_t i : read) add_site(all.points[points[i]].site, level_of(points[i]));
+    for (const std::uint32_t p : points) {
+      const std::size_t level = level_of(p);
+      stats.gathered.resize(std::max(stats.gathered.size(), level + 1));
+      ++stats.gathered[level];
+    }
+  }
+
+  std::uint8_t level_of(std::uint32_t point) const {
+    return static_cast<std::uint8_t>(std::upper_bound(all.level_end.begin(), all.level_end.end(), point) -
+                                     all.level_end.begin());
   }
 
   void add_site(const SurfaceSite& site, std::uint8_t level) {
     links.sites.push_back({site.position, pack_normal(site.normal), level});
   }
 
-  /// Twice, as which nodes rows use depends on the shares.
-  void weigh_shares(const std::vector<TransferPoint>& places, Threads& threads) {
-    for (int round = 0; round < 2; ++round) {
-      std::vector<std::uint64_t> use(tree.nodes());
-      std::mutex joining;
-      threads.for_blocks(places.size(), kShareBlock, [&](std::size_t begin, std::size_t end) {
-        LinkMaker maker(tree, params.oracle);
-        std::vector<std::uint64_t> own(tree.nodes());
-        for (std::size_t i = begin; i < end; ++i) {
-          const LinkMaker::Use counted{own, tree.area[i]};
-          (void)maker.links_of(rows->rays_of(i, places[i]), &counted);
-        }
-        const std::lock_guard<std::mutex> lock(joining);  // whole numbers: in any order
-        for (std::size_t n = 0; n < own.size(); ++n) use[n] += own[n];
-      });
-      set_shares(tree, use);
-    }
+  /// Rows `first` and on of `from`, those of them that are `chosen`.
+  struct Linking {
+    const GatherRows& from;
+    std::size_t first;
+    const std::vector<TransferPoint>& places;
+    const LinkOracle& oracle;
+    const std::vector<std::uint32_t>& chosen;
+  };
+
+  void make_links(const Linking& task, Threads& threads) {
+    for (const auto& row : links_of(task, nullptr, threads)) append_row(row, links);
   }
 
-  void make_links(const GatherRows& from, std::size_t first, const std::vector<TransferPoint>& places,
-                  Threads& threads) {
-    std::vector<std::vector<FullLink>> made(places.size());
-    threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      LinkMaker maker(tree, params.oracle);
-      for (std::size_t i = begin; i < end; ++i) made[i] = maker.links_of(from.rays_of(first + i, places[i]));
+  /// `use`: what the rows use of each node is added (link_rows.h).
+  std::vector<std::vector<FullLink>> links_of(const Linking& task, std::vector<std::uint64_t>* use, Threads& threads) {
+    std::vector<std::vector<FullLink>> made(task.chosen.size());
+    std::mutex joining;
+    threads.for_blocks(made.size(), kShareBlock, [&](std::size_t begin, std::size_t end) {
+      LinkMaker maker(tree, task.oracle);
+      std::vector<std::uint64_t> own(use != nullptr ? tree.nodes() : 0);
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t row = task.chosen[i];
+        const LinkMaker::Use counted{own, use != nullptr ? tree.area[row] : 0};
+        made[i] =
+            maker.links_of(task.from.rays_of(task.first + row, task.places[row]), use != nullptr ? &counted : nullptr);
+      }
+      const std::lock_guard<std::mutex> lock(joining);  // whole numbers: in any order
+      for (std::size_t n = 0; n < own.size(); ++n) (*use)[n] += own[n];
     });
+    return made;
+  }
+
+  /// The senders' rows. Which nodes they use depends on the shares, and the shares on what they use: the links are
+  /// those of the second round, the shares what these use.
+  void link_senders(const Linking& task, Threads& threads) {
+    std::vector<std::vector<FullLink>> made;
+    for (int round = 0; round < 2; ++round) {
+      std::vector<std::uint64_t> use(tree.nodes());
+      made = links_of(task, &use, threads);
+      set_shares(tree, use);
+    }
     for (const auto& row : made) append_row(row, links);
   }
 
@@ -170,7 +205,8 @@ struct LinkBuilder::Work {
       const Light light{.intensity = {1, 1, 1}, .position = place};
       direct.push_back(light_senders(links, light, tracer, threads));
     }
-    count_sweeps(direct);
+    const std::vector<std::vector<Vec3f>> even = {std::vector<Vec3f>(links.senders, Vec3f{1, 1, 1})};
+    count_sweeps(direct.empty() ? even : direct);
     for (const auto& e : direct) {
       std::vector<Vec3f> x = solve_nodes(links, e);
       const double mean = over_area(x);
@@ -364,7 +400,9 @@ struct LinkBuilder::Work {
       reading[vertex[i]].terms = {{static_cast<std::uint32_t>(links.rows() + i), 255}};
       add_site({places[i].position, places[i].normal, 0}, RowSite::kLone);
     }
-    make_links(*lone_rows, first, places, threads);
+    std::vector<std::uint32_t> every(places.size());
+    for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
+    make_links({*lone_rows, first, places, params.oracle, every}, threads);
   }
 
   std::vector<std::uint32_t> groups_of(const Mesh& mesh) const {
@@ -400,8 +438,7 @@ struct LinkBuilder::Work {
   }
 
   /// Weights in 255ths that sum to 255; the smallest are left out.
-  static std::vector<RowTerm> rounded(std::vector<BasisTerm> terms, float sum,
-                                      const std::vector<std::uint32_t>& known) {
+  std::vector<RowTerm> rounded(std::vector<BasisTerm> terms, float sum, const std::vector<std::uint32_t>& known) const {
     std::sort(terms.begin(), terms.end(), [](const BasisTerm& a, const BasisTerm& b) {
       return a.value != b.value ? a.value > b.value : a.function < b.function;
     });
@@ -413,7 +450,7 @@ struct LinkBuilder::Work {
       const int whole = std::clamp(static_cast<int>(std::lrint(exact)), 0, 255 - given);
       left = exact - static_cast<float>(whole);
       given += whole;
-      if (whole > 0) out.push_back({known[t.function], static_cast<std::uint8_t>(whole)});
+      if (whole > 0) out.push_back({link_row[known[t.function]], static_cast<std::uint8_t>(whole)});
     }
     if (!out.empty()) out.front().weight = static_cast<std::uint8_t>(out.front().weight + 255 - given);
     return out;

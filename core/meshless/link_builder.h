@@ -3,7 +3,8 @@
 // vertices of a mesh read.
 //  1. Points on all levels; those up to `sender_level` are senders, on both sides of double-sided faces, so that no
 //     light is lost on backs.
-//  2. Each sender gathers (gather_rows.h, strict paths), and its row becomes links (link_rows.h).
+//  2. Each sender gathers (gather_rows.h, strict paths), and its row becomes links (link_rows.h): few for the sweeps
+//     among senders, and more for vertices that read there.
 //  3. Finer points on the side of the vertex normals gather where one of kProbes lamps in free places lights a point
 //     otherwise than the points before it predict: by more than eps times the mean light of that lamp.
 //  4. After so many sweeps (at most kMostLinkSweeps) what is left of the lamps' light is taken for a geometric series,
@@ -32,7 +33,7 @@ struct LinkParams {
   int sender_level = -1;  // -1: the finest with at most kAutoSenders points
   int rays = 1024;        // of a gather
   float eps = 0.02F;      // prediction error that asks for finer points, of a lamp's mean light
-  LinkOracle oracle;
+  LinkOracle oracle, sender_oracle{.split = 0.01F, .largest = 0.08F};
   int bounces = -1;     // reflections; -1: all. 0: no links
   int neighbours = 10;  // of a vertex
   std::uint64_t seed = 0;

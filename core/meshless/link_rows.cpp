@@ -38,11 +38,13 @@ bool LinkMaker::splits(std::uint32_t node) const {
 }
 
 void LinkMaker::count_below(std::uint32_t node, const Use& use) const {
-  use.nodes[node] += static_cast<std::uint64_t>(double{sums_[node].weight} * double{use.area} * 0x1p24);
   if (node < tree_.senders) return;
   const std::uint32_t i = node - tree_.senders;
   for (std::uint32_t k = tree_.child_begin[i]; k < tree_.child_begin[i + 1]; ++k) {
-    if (sums_[tree_.children[k].node].rays > 0) count_below(tree_.children[k].node, use);
+    const std::uint32_t child = tree_.children[k].node;
+    if (sums_[child].rays == 0) continue;
+    use.nodes[child] += static_cast<std::uint64_t>(double{sums_[child].weight} * double{use.area} * 0x1p24);
+    count_below(child, use);
   }
 }
 

@@ -18,8 +18,8 @@
 namespace kiln {
 
 struct LinkOracle {
-  float split = 0.002F;   // of a row's light
-  float largest = 0.03F;  // of it
+  float split = 0.003F;   // of a row's light
+  float largest = 0.04F;  // of it
 };
 
 /// A link before it is rounded.
