@@ -14,7 +14,7 @@
 namespace kiln {
 namespace {
 
-constexpr std::size_t kBlock = 128, kShareBlock = 512;
+constexpr std::size_t kBlock = 128, kShareBlock = 512, kBatch = 4096;
 constexpr std::uint32_t kUnread = 0xffffffffU;
 constexpr double kMostUnsteady = 0.9;  // factor that is believed when it has not become steady
 constexpr float kChildReach = 2;       // of the parent level's R
@@ -59,13 +59,15 @@ struct LinkBuilder::Work {
   PointHierarchy all, coarse;
   std::optional<Senders> senders;
   std::optional<SenderPaths> paths;
-  std::optional<GatherRows> rows, lone_rows;
+  std::optional<GatherRows> sender_rows, lone_rows;
   SenderTree tree;
   std::vector<std::uint32_t> receiver;   // the point of each gathered row
   std::vector<std::uint32_t> link_row;   // of each gathered row: the row of links that vertices read, or kUnread
   std::vector<std::vector<Vec3f>> lamp;  // of each probe: light at the senders, all reflections
   std::vector<Vec3f> gathered;           // [row * probes + probe]: what one more reflection brings
   std::vector<float> limit;              // of each probe
+  std::optional<MeshlessBasis> reading_basis;
+  std::vector<std::uint32_t> reading_known;
   LightLinks links;
   LinkStats stats;
 
@@ -80,7 +82,7 @@ struct LinkBuilder::Work {
     stats.sender_level = static_cast<int>(coarse.levels()) - 1;
     senders.emplace(tracer.scene(), coarse, placement, threads);
     paths.emplace(SenderPaths::World{tracer, faces, albedo, *senders, nullptr, true});
-    rows.emplace(*paths, params.rays, params.seed);
+    sender_rows.emplace(*paths, params.rays, params.seed);
     lone_rows.emplace(*paths, params.rays, mix64(params.seed));
     links.sample_begin = {0}, links.child_begin = {0}, links.link_begin = {0};
   }
@@ -102,55 +104,12 @@ struct LinkBuilder::Work {
     links.samples = samples.samples;
     links.child_begin = tree.child_begin;
     links.children = tree.children;
-    std::vector<std::uint32_t> own(coarse.points.size());
-    for (std::uint32_t i = 0; i < own.size(); ++i) own[i] = i;
-    gather(own, threads);
-    links.children = tree.children;
+    begin_rows(threads);
     begin_stage("receivers");
     light_probes(threads);
-    measure(0, threads);
+    for (std::size_t r = 0; r < receiver.size(); ++r) measure(*sender_rows, r);
+    sender_rows.reset();
     refine(threads);
-  }
-
-  /// Traces rows of points and makes their links: of senders coarse ones for the sweeps, and fine ones for whoever
-  /// reads those that stand on the side of the vertex normals.
-  void gather(const std::vector<std::uint32_t>& points, Threads& threads) {
-    std::vector<TransferPoint> places;
-    for (const std::uint32_t p : points) {
-      receiver.push_back(p);
-      places.push_back(transfer_point(all.points[p]));
-    }
-    const std::size_t first = rows->size();
-    rows->add(places, false, threads, stats.rays);
-    std::vector<std::uint32_t> every(points.size());
-    for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
-    if (first == 0) {
-      link_senders({*rows, first, places, params.sender_oracle, every}, threads);
-      for (const std::uint32_t p : points) add_site(all.points[p].site, level_of(p));
-    }
-    std::vector<std::uint32_t> read;
-    link_row.resize(receiver.size(), kUnread);
-    for (const std::uint32_t i : every) {
-      if (all.points[points[i]].behind) continue;
-      link_row[first + i] = static_cast<std::uint32_t>(links.rows() + read.size());
-      read.push_back(i);
-    }
-    make_links({*rows, first, places, params.oracle, read}, threads);
-    for (const std::uint32_t i : read) add_site(all.points[points[i]].site, level_of(points[i]));
-    for (const std::uint32_t p : points) {
-      const std::size_t level = level_of(p);
-      stats.gathered.resize(std::max(stats.gathered.size(), level + 1));
-      ++stats.gathered[level];
-    }
-  }
-
-  std::uint8_t level_of(std::uint32_t point) const {
-    return static_cast<std::uint8_t>(std::upper_bound(all.level_end.begin(), all.level_end.end(), point) -
-                                     all.level_end.begin());
-  }
-
-  void add_site(const SurfaceSite& site, std::uint8_t level) {
-    links.sites.push_back({site.position, pack_normal(site.normal), level});
   }
 
   /// Rows `first` and on of `from`, those of them that are `chosen`.
@@ -161,6 +120,66 @@ struct LinkBuilder::Work {
     const LinkOracle& oracle;
     const std::vector<std::uint32_t>& chosen;
   };
+
+  /// The senders' rows: coarse links for the sweeps, fine ones for whoever reads there.
+  void begin_rows(Threads& threads) {
+    std::vector<std::uint32_t> own(coarse.points.size());
+    for (std::uint32_t i = 0; i < own.size(); ++i) own[i] = i;
+    const std::vector<TransferPoint> places = places_of(own);
+    sender_rows->add(places, false, threads, stats.rays);
+    link_senders({*sender_rows, 0, places, params.sender_oracle, own}, threads);
+    links.children = tree.children;
+    for (const std::uint32_t p : own) add_site(all.points[p].site, level_of(p));
+    add_readable({*sender_rows, 0, places, params.oracle, own}, own, threads);
+  }
+
+  /// More receivers, a batch at a time: what was traced is let go when its links are made.
+  void gather(const std::vector<std::uint32_t>& points, Threads& threads) {
+    for (std::size_t first = 0; first < points.size(); first += kBatch) {
+      const std::vector<std::uint32_t> batch(
+          points.begin() + static_cast<std::ptrdiff_t>(first),
+          points.begin() + static_cast<std::ptrdiff_t>(std::min(points.size(), first + kBatch)));
+      std::vector<std::uint32_t> every(batch.size());
+      for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
+      const std::vector<TransferPoint> places = places_of(batch);
+      GatherRows rows(*paths, params.rays, params.seed);
+      rows.add(places, false, threads, stats.rays);
+      add_readable({rows, 0, places, params.oracle, every}, batch, threads);
+      for (std::size_t i = 0; i < batch.size(); ++i) measure(rows, i);
+    }
+  }
+
+  std::vector<TransferPoint> places_of(const std::vector<std::uint32_t>& points) const {
+    std::vector<TransferPoint> places;
+    for (const std::uint32_t p : points) places.push_back(transfer_point(all.points[p]));
+    return places;
+  }
+
+  /// Fine links of those of the gathered points that stand on the side of the vertex normals.
+  void add_readable(const Linking& gathered_rows, const std::vector<std::uint32_t>& points, Threads& threads) {
+    std::vector<std::uint32_t> read;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+      const std::uint32_t p = points[i];
+      receiver.push_back(p);
+      const bool read_it = !all.points[p].behind;
+      link_row.push_back(read_it ? static_cast<std::uint32_t>(links.rows() + read.size()) : kUnread);
+      if (read_it) read.push_back(i);
+      const std::size_t level = level_of(p);
+      stats.gathered.resize(std::max(stats.gathered.size(), level + 1));
+      ++stats.gathered[level];
+    }
+    make_links({gathered_rows.from, gathered_rows.first, gathered_rows.places, gathered_rows.oracle, read}, threads);
+    for (const std::uint32_t i : read) add_site(all.points[points[i]].site, level_of(points[i]));
+  }
+
+  std::uint8_t level_of(std::uint32_t point) const {
+    return static_cast<std::uint8_t>(std::upper_bound(all.level_end.begin(), all.level_end.end(), point) -
+                                     all.level_end.begin());
+  }
+
+  void add_site(const SurfaceSite& site, std::uint8_t level) {
+    links.sites.push_back({site.position, pack_normal(site.normal), level});
+  }
 
   void make_links(const Linking& task, Threads& threads) {
     for (const auto& row : links_of(task, nullptr, threads)) append_row(row, links);
@@ -205,8 +224,10 @@ struct LinkBuilder::Work {
       const Light light{.intensity = {1, 1, 1}, .position = place};
       direct.push_back(light_senders(links, light, tracer, threads));
     }
-    const std::vector<std::vector<Vec3f>> even = {std::vector<Vec3f>(links.senders, Vec3f{1, 1, 1})};
-    count_sweeps(direct.empty() ? even : direct);
+    // Even light has a say too: what no probe reaches is part of the scene.
+    std::vector<std::vector<Vec3f>> counted = direct;
+    counted.emplace_back(links.senders, Vec3f{1, 1, 1});
+    count_sweeps(counted);
     for (const auto& e : direct) {
       std::vector<Vec3f> x = solve_nodes(links, e);
       const double mean = over_area(x);
@@ -260,14 +281,9 @@ struct LinkBuilder::Work {
     links.tail = static_cast<float>(ratio / (1 - ratio));
   }
 
-  /// What the probes bring to rows from `first` on.
-  void measure(std::size_t first, Threads& threads) {
-    gathered.resize(rows->size() * probes());
-    threads.for_blocks(rows->size() - first, kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = first + begin; r < first + end; ++r) {
-        for (std::size_t k = 0; k < probes(); ++k) gathered[r * probes() + k] = rows->apply(r, lamp[k]);
-      }
-    });
+  /// What the probes bring to a row.
+  void measure(const GatherRows& rows, std::size_t row) {
+    for (std::size_t k = 0; k < probes(); ++k) gathered.push_back(rows.apply(row, lamp[k]));
   }
 
   /// The rows that vertices may read: those on the side of the vertex normals, of levels below `levels`.
@@ -291,9 +307,7 @@ struct LinkBuilder::Work {
     for (std::size_t level = coarse.levels(); level < all.levels(); ++level) {
       const std::vector<std::uint32_t> chosen = children_of(mispredicted(level - 1, threads), level);
       if (chosen.empty()) return;
-      const std::size_t first = rows->size();
       gather(chosen, threads);
-      measure(first, threads);
     }
   }
 
@@ -346,6 +360,35 @@ struct LinkBuilder::Work {
       });
       if (near && !all.points[p].behind) out.push_back(p);
     }
+    return out;
+  }
+
+  std::vector<float> probe_light(std::span<const TransferPoint> places, Threads& threads) {
+    std::vector<float> out(places.size() * probes(), 0.0F);
+    if (probes() == 0) return out;
+    if (!reading_basis) {
+      reading_known = readable(all.levels());
+      reading_basis.emplace(basis_of(reading_known, threads));
+    }
+    threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<BasisTerm> terms;
+      for (std::size_t i = begin; i < end; ++i) {
+        terms.clear();
+        const TransferPoint& p = places[i];
+        if (reading_basis->terms({p.position, p.normal, 0}, 1, terms) != Cover::functions) continue;
+        float sum = 0;
+        std::vector<float> light(probes());
+        for (const BasisTerm& t : terms) {
+          const std::uint32_t r = reading_known[t.function];
+          if (!in_sight(tracer, {ray_origin(p), p.normal, 0}, all.points[receiver[r]].site)) continue;
+          sum += t.value;
+          for (std::size_t k = 0; k < probes(); ++k)
+            light[k] += t.value * static_cast<float>(mean_of(gathered[r * probes() + k]));
+        }
+        for (std::size_t k = 0; k < probes() && sum > 0; ++k)
+          out[i * probes() + k] = limit[k] > 0 ? params.eps * light[k] / (sum * limit[k]) : 0;
+      }
+    });
     return out;
   }
 
@@ -464,6 +507,12 @@ LinkBuilder::LinkBuilder(const Tracer& tracer, const LinkParams& params, Threads
 }
 
 LinkBuilder::~LinkBuilder() = default;
+
+std::size_t LinkBuilder::probes() const { return work_->probes(); }
+
+std::vector<float> LinkBuilder::probe_light(std::span<const TransferPoint> places, Threads& threads) const {
+  return work_->probe_light(places, threads);
+}
 
 LightLinks LinkBuilder::finish(const Mesh& mesh, Threads& threads) { return work_->finish(mesh, threads); }
 

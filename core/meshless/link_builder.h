@@ -62,6 +62,11 @@ class LinkBuilder {
   LinkBuilder(const LinkBuilder&) = delete;
   LinkBuilder& operator=(const LinkBuilder&) = delete;
 
+  /// How many lamps receivers were refined for, and what each reflects to places (mean of red, green and blue over the
+  /// lamp's mean light): value[place * probes + probe]. Places that no receiver reaches are told 0.
+  std::size_t probes() const;
+  std::vector<float> probe_light(std::span<const TransferPoint>, Threads&) const;
+
   /// Step 5 for the vertices of a mesh on the same surface, and the whole operator.
   LightLinks finish(const Mesh&, Threads&);
   const LinkStats& stats() const;
