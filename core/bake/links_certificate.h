@@ -4,9 +4,12 @@
 //
 // Lamps    kCertifiedLamps of 1 W/sr in random free places (core/meshless/free_places.h), other ones than those the
 // bake
-//          refined for, and the scene's own punctual lights, at most as many. Each is one lighting.
-// Points   area-uniform on the delivered surface; the reference stands at the nearest place of the input with a
-//          compatible normal. Those inside solids, which nobody sees, are left out.
+//          refined for, and the scene's own point lights, at most as many. Each is one lighting. Own ones that touch
+//          what is around them are left out: what a point light reflects has no bound there.
+// Points   random on the delivered surface, half of them area-uniform, half where the lamps' reflected light is (a lamp
+//          lights one room of many), weighted so that every figure is that of area-uniform ones; the reference stands
+//          at the nearest place of the input with a compatible normal. Those inside solids, which nobody sees, are left
+//          out.
 // Repeat   same numbers for any thread count.   Never changes the artefact
 
 #include <cstdint>
@@ -21,9 +24,11 @@ inline constexpr std::size_t kCertifiedLamps = 8;
 
 struct LinksCertificate {
   ErrorStats error;
-  std::vector<Vec3d> lamps;        // world places; directional lights of the scene have none: their direction
+  std::vector<Vec3d> lamps;        // world places
   std::vector<double> mean_light;  // of the reference under each: value = irradiance / pi
-  bool dark = false;               // nothing is reflected: error 0 by definition
+  double of_rms = 0;  // root of the squared error over the squared light, less the noise of both: where a lamp lights a
+                      // hundredth of a scene its relRMSE is ten times this
+  bool dark = false;  // nothing is reflected: error 0 by definition
   std::size_t points = 0;
   int samples = 0;         // paths a point
   std::uint64_t rays = 0;  // of the reference

@@ -134,6 +134,7 @@ ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
 ordered_json links_certificate_object(const std::optional<LinksCertificate>& certificate) {
   if (!certificate) return nullptr;
   ordered_json out = error_object(certificate->error);
+  out["of_rms"] = certificate->of_rms;
   out["lamps"] = ordered_json::array();
   for (std::size_t k = 0; k < certificate->lamps.size(); ++k) {
     const Vec3d& at = certificate->lamps[k];

@@ -40,15 +40,18 @@ bool is_free(const Tracer& tracer, const GatherFaces& faces, const Vec3f& place,
   return met >= kLooks / 4;
 }
 
-}  // namespace
+struct Candidates {
+  std::vector<Vec3f> places;
+  float clear = 0;  // how far surfaces must be
+};
 
-std::vector<Vec3f> free_places(const Tracer& tracer, std::size_t count, std::uint64_t seed) {
+Candidates candidate_places(const Tracer& tracer, std::size_t count, std::uint64_t seed) {
   const Scene& scene = tracer.scene();
   const Mesh& mesh = scene.mesh;
   std::vector<double> cumulative;
   double sum = 0;
   for (const Triangle& t : mesh.triangles) cumulative.push_back(sum += triangle_area(mesh, t));
-  std::vector<Vec3f> candidates, out;
+  Candidates out;
   if (!(sum > 0)) return out;
   const GatherFaces faces(scene);
   std::vector<float> reach;
@@ -76,17 +79,32 @@ std::vector<Vec3f> free_places(const Tracer& tracer, std::size_t count, std::uin
     if (hit && faces.side(hit.triangle, w) == HitSide::dark) continue;
     const float far = hit ? hit.t : way_out(origin, w);
     reach.push_back(far);
-    candidates.push_back(origin + w * (share * far));
+    out.places.push_back(origin + w * (share * far));
   }
   if (reach.empty()) return out;
   const auto middle = reach.begin() + static_cast<std::ptrdiff_t>(reach.size() / 2);
   std::nth_element(reach.begin(), middle, reach.end());
-  const float clear = kClear * *middle;
-  for (std::size_t i = 0; i < candidates.size() && out.size() < count; ++i) {
+  out.clear = kClear * *middle;
+  return out;
+}
+
+}  // namespace
+
+std::vector<Vec3f> free_places(const Tracer& tracer, std::size_t count, std::uint64_t seed) {
+  const Candidates all = candidate_places(tracer, count, seed);
+  const GatherFaces faces(tracer.scene());
+  std::vector<Vec3f> out;
+  for (std::size_t i = 0; i < all.places.size() && out.size() < count; ++i) {
     Random random(mix64(seed), i);
-    if (is_free(tracer, faces, candidates[i], clear, random)) out.push_back(candidates[i]);
+    if (is_free(tracer, faces, all.places[i], all.clear, random)) out.push_back(all.places[i]);
   }
   return out;
+}
+
+bool hangs_free(const Tracer& tracer, const Vec3f& place) {
+  const float clear = candidate_places(tracer, 0, 1).clear;
+  Random random(1, 0);
+  return is_free(tracer, GatherFaces(tracer.scene()), place, clear, random);
 }
 
 }  // namespace kiln

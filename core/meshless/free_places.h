@@ -16,4 +16,7 @@ namespace kiln {
 
 std::vector<Vec3f> free_places(const Tracer&, std::size_t count, std::uint64_t seed);
 
+/// Whether a place counts, as said above.
+bool hangs_free(const Tracer&, const Vec3f& place);
+
 }  // namespace kiln
