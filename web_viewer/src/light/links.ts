@@ -117,12 +117,19 @@ export function lightSenders(l: LightLinks, { place, intensity }: PointLamp, see
   return out;
 }
 
+// The loops below run over a million links for each place of a lamp: no destructuring, nothing is allocated in them.
+
 /// Nodes above the senders: the shares of their children.
 function climb(l: LightLinks, x: Float32Array): void {
-  for (let i = 0; i + 1 < l.childBegin.length; ++i) {
-    let [r, g, b, all] = [0, 0, 0, 0];
-    for (let k = l.childBegin[i]; k < l.childBegin[i + 1]; ++k) {
-      const [node, share] = [3 * l.children[2 * k], l.children[2 * k + 1]];
+  const { childBegin, children } = l;
+  for (let i = 0; i + 1 < childBegin.length; ++i) {
+    let r = 0;
+    let g = 0;
+    let b = 0;
+    let all = 0;
+    for (let k = childBegin[i]; k < childBegin[i + 1]; ++k) {
+      const node = 3 * children[2 * k];
+      const share = children[2 * k + 1];
       r += share * x[node];
       g += share * x[node + 1];
       b += share * x[node + 2];
@@ -135,27 +142,37 @@ function climb(l: LightLinks, x: Float32Array): void {
   }
 }
 
-/// Equations 2 to 4: all light at the nodes. `direct` as lightSenders gives it; is overwritten.
+/// One more reflection among the senders: next = direct + T x.
+function sweepOnce(l: LightLinks, direct: Float32Array, x: Float32Array, next: Float32Array): void {
+  const { linkBegin, linkNodes, linkBytes, scale } = l;
+  for (let s = 0; s < l.senders; ++s) {
+    let r = 0;
+    let g = 0;
+    let b = 0;
+    const end = linkBegin[s + 1];
+    for (let k = linkBegin[s]; k < end; ++k) {
+      const node = 3 * linkNodes[4 * k];
+      const at = 8 * k;
+      r += linkBytes[at + 2] * x[node];
+      g += linkBytes[at + 3] * x[node + 1];
+      b += linkBytes[at + 4] * x[node + 2];
+    }
+    const by = scale[s] / 255;
+    next[3 * s] = direct[3 * s] + by * r;
+    next[3 * s + 1] = direct[3 * s + 1] + by * g;
+    next[3 * s + 2] = direct[3 * s + 2] + by * b;
+  }
+}
+
+/// Equations 2 to 4: all light at the nodes. `direct` as lightSenders gives it.
 export function solveNodes(l: LightLinks, direct: Float32Array): Float32Array {
   const x = direct.slice();
   const before = new Float32Array(3 * l.senders);
+  const next = new Float32Array(3 * l.senders);
   climb(l, x);
   for (let sweep = 0; sweep < l.sweeps; ++sweep) {
     before.set(x.subarray(0, before.length));
-    const next = new Float32Array(3 * l.senders);
-    for (let s = 0; s < l.senders; ++s) {
-      let [r, g, b] = [0, 0, 0];
-      for (let k = l.linkBegin[s]; k < l.linkBegin[s + 1]; ++k) {
-        const [node, at] = [3 * l.linkNodes[4 * k], 8 * k];
-        r += l.linkBytes[at + 2] * x[node];
-        g += l.linkBytes[at + 3] * x[node + 1];
-        b += l.linkBytes[at + 4] * x[node + 2];
-      }
-      const scale = l.scale[s] / 255;
-      next[3 * s] = direct[3 * s] + scale * r;
-      next[3 * s + 1] = direct[3 * s + 1] + scale * g;
-      next[3 * s + 2] = direct[3 * s + 2] + scale * b;
-    }
+    sweepOnce(l, direct, x, next);
     x.set(next);
     climb(l, x);
   }
@@ -170,14 +187,32 @@ const kRow = 12; // value of red, green and blue, then the turn of each
 
 /// Equation 5 at the rows that vertices read, before the normal comes in: 12 numbers each.
 export function gatherRows(l: LightLinks, x: Float32Array): Float32Array {
-  const rows = l.scale.length;
+  const { linkBegin, linkNodes, linkBytes, linkAsides, scale } = l;
+  const rows = scale.length;
   const out = new Float32Array(kRow * rows);
   for (let row = l.senders; row < rows; ++row) {
-    let [r, g, b, rx, ry, rz, gx, gy, gz, bx, by, bz] = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
-    for (let k = l.linkBegin[row]; k < l.linkBegin[row + 1]; ++k) {
-      const [node, at] = [3 * l.linkNodes[4 * k], 8 * k];
-      const [vr, vg, vb] = [l.linkBytes[at + 2] * x[node], l.linkBytes[at + 3] * x[node + 1], l.linkBytes[at + 4] * x[node + 2]];
-      const [ax, ay, az] = [l.linkAsides[at + 5], l.linkAsides[at + 6], l.linkAsides[at + 7]];
+    let r = 0;
+    let g = 0;
+    let b = 0;
+    let rx = 0;
+    let ry = 0;
+    let rz = 0;
+    let gx = 0;
+    let gy = 0;
+    let gz = 0;
+    let bx = 0;
+    let by = 0;
+    let bz = 0;
+    const end = linkBegin[row + 1];
+    for (let k = linkBegin[row]; k < end; ++k) {
+      const node = 3 * linkNodes[4 * k];
+      const at = 8 * k;
+      const vr = linkBytes[at + 2] * x[node];
+      const vg = linkBytes[at + 3] * x[node + 1];
+      const vb = linkBytes[at + 4] * x[node + 2];
+      const ax = linkAsides[at + 5];
+      const ay = linkAsides[at + 6];
+      const az = linkAsides[at + 7];
       r += vr;
       g += vg;
       b += vb;
@@ -191,12 +226,12 @@ export function gatherRows(l: LightLinks, x: Float32Array): Float32Array {
       by += vb * ay;
       bz += vb * az;
     }
-    const scale = l.scale[row] / 255;
-    const turn = scale / 16;
+    const value = scale[row] / 255;
+    const turn = value / 16;
     const o = kRow * row;
-    out[o] = scale * r;
-    out[o + 1] = scale * g;
-    out[o + 2] = scale * b;
+    out[o] = value * r;
+    out[o + 1] = value * g;
+    out[o + 2] = value * b;
     out[o + 3] = turn * rx;
     out[o + 4] = turn * ry;
     out[o + 5] = turn * rz;
@@ -211,13 +246,24 @@ export function gatherRows(l: LightLinks, x: Float32Array): Float32Array {
 }
 
 /// What vertices `first` and on read, one for each normal: RGB of a white surface. Written to `to`.
-export function readVertices(l: LightLinks, rows: Float32Array, normals: Float32Array, first: number, to: Float32Array): void {
-  for (let v = 0; v < normals.length / 3; ++v) {
-    const [x, y, z] = [normals[3 * v], normals[3 * v + 1], normals[3 * v + 2]];
-    let [r, g, b] = [0, 0, 0];
-    for (let k = l.termBegin[first + v]; k < l.termBegin[first + v + 1]; ++k) {
-      const o = kRow * l.termRows[k];
-      const weight = l.termWeights[k] / 255;
+export function readVertices(
+  l: LightLinks,
+  rows: Float32Array,
+  normals: Float32Array,
+  { first, to }: { first: number; to: Float32Array },
+): void {
+  const { termBegin, termRows, termWeights } = l;
+  for (let v = 0; 3 * v < normals.length; ++v) {
+    const x = normals[3 * v];
+    const y = normals[3 * v + 1];
+    const z = normals[3 * v + 2];
+    let r = 0;
+    let g = 0;
+    let b = 0;
+    const end = termBegin[first + v + 1];
+    for (let k = termBegin[first + v]; k < end; ++k) {
+      const o = kRow * termRows[k];
+      const weight = termWeights[k] / 255;
       r += weight * Math.max(0, rows[o] + x * rows[o + 3] + y * rows[o + 4] + z * rows[o + 5]);
       g += weight * Math.max(0, rows[o + 1] + x * rows[o + 6] + y * rows[o + 7] + z * rows[o + 8]);
       b += weight * Math.max(0, rows[o + 2] + x * rows[o + 9] + y * rows[o + 10] + z * rows[o + 11]);

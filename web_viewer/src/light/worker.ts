@@ -54,7 +54,7 @@ function lampLight({ lamp, seen, baked, reuse }: LampRequest): Float32Array[] {
   let first = 0;
   return parts.map(({ normals }, i) => {
     const to = reuse[i]?.length === normals.length ? reuse[i] : new Float32Array(normals.length);
-    readVertices(links!, rows, normals, first, to);
+    readVertices(links!, rows, normals, { first, to });
     first += normals.length / 3;
     if (baked) for (let k = 0; k < to.length; ++k) to[k] += own[i][k];
     return to;
