@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/free_places.h"
 #include "core/meshless/link_builder.h"
@@ -214,6 +215,32 @@ TEST(LightLinks, OfALightInsideASolidAreDark) {
   const Tracer tracer(solid, threads);
   for (const Vec3f& x : reflected_light(m.links, lamp_at({0, 0.3F, 0}), tracer, scene.mesh.normal, threads))
     EXPECT_EQ(x, Vec3f{});
+}
+
+TEST(LightLinks, OfDirtyGeometryAreFiniteAndLoseOrMakeNoMoreThanAlbedo) {
+  std::vector<Scene> scenes = {testing::random_scene(3, 400), testing::room_scene(), closed_box(0.6F)};
+  // Two sheets a millionth apart in the room, both double-sided and seen from both sides.
+  const std::uint32_t sheet = testing::add_part(scenes[1], {0.5F, 0.5F, 0.5F}, true);
+  testing::add_grid(scenes[1], {-0.2F, 0, 0.2F}, {0.4F, 0, 0}, {0, 0, -0.4F}, 2, 2, sheet);
+  testing::add_grid(scenes[1], {-0.2F, 1e-6F, 0.2F}, {0.4F, 0, 0}, {0, 0, -0.4F}, 2, 2, sheet);
+  // Random normals, and some that contradict their faces.
+  Random random(5, 0);
+  for (Vec3f& n : scenes[2].mesh.normal)
+    n = normalized(Vec3f{random.uniform() - 0.5F, random.uniform() - 0.5F, random.uniform() - 0.5F}, n);
+  for (const Scene& scene : scenes) {
+    const Made m = make(scene, {.points = {.wanted = 1500}, .rays = 64});
+    print(m);
+    const std::vector<Vec3f> ones(m.links.nodes(), Vec3f{1, 1, 1});
+    Threads threads(2);
+    for (const VectorValue& v : gather_links(m.links, ones, threads)) {
+      // Albedos are at most .999 (core/trace); rounding adds half a step.
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_LE(v.value[c], 1.001F);
+    }
+    for (const Vec3f& x : apply(scene, m.links, lamp_at({0.05F, 0.21F, 0.03F}))) {
+      EXPECT_TRUE(is_finite(x));
+      EXPECT_GE(std::min({x.x, x.y, x.z}), 0.0F);
+    }
+  }
 }
 
 TEST(LightLinks, StandExtremesOfPlacement) {
