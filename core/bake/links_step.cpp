@@ -16,19 +16,20 @@ struct LinksEffort {
   int rays;
   float eps;
   LinkOracle oracle;
-  double points;  // times the automatic number
+  double points;               // times the automatic number
+  std::uint32_t most_senders;  // where the recipe gives no level
 };
 
 LinksEffort links_effort(Quality quality) {
   switch (quality) {
     case Quality::draft:
-      return {"the draft quality", 256, 0.05F, {.split = 0.01F, .largest = 0.08F}, 0.5};
+      return {"the draft quality", 256, 0.05F, {.split = 0.01F, .largest = 0.08F}, 0.5, 6000};
     case Quality::standard:
-      return {"the standard quality", 1024, 0.02F, {}, 1};
+      return {"the standard quality", 1024, 0.02F, {}, 1, kAutoSenders};
     case Quality::finest:
       break;
   }
-  return {"the final quality", 4096, 0.01F, {.split = 0.0015F, .largest = 0.02F}, 2};
+  return {"the final quality", 4096, 0.01F, {.split = 0.0015F, .largest = 0.02F}, 2, 40000};
 }
 
 void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
@@ -57,7 +58,7 @@ void add_prediction(Plan& plan, const Scene& scene) {
   const LinkParams& l = *plan.links;
   const double finest = std::ldexp(double{l.points.radius}, 1 - l.points.levels);
   const double points = expected_points(sending_area(scene), finest), rays = points * l.rays;
-  const double senders = std::min(points, double{kAutoSenders});
+  const double senders = std::min(points, double(l.most_senders));
   Prediction& out = plan.prediction;
   const auto whole = [](double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); };
   out.rays += whole(2 * rays);
@@ -80,6 +81,7 @@ Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment
   l.oracle = effort.oracle;
   l.bounces = step.surface.bounces.value_or(-1);
   l.sender_level = step.sender_level.value_or(-1);
+  l.most_senders = effort.most_senders;
   if (step.surface.radius || step.surface.levels) {
     l.points = plan.radiosity->points;
   } else {
@@ -91,7 +93,7 @@ Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment
   decide(plan, "links", "about " + short_text(expected_points(sending_area(scene), finest)) + " points",
          "reflected light of lights that move, from senders to receivers; backs of double-sided faces send too");
   decide(plan, "sender_level", l.sender_level < 0 ? "auto" : std::to_string(l.sender_level),
-         l.sender_level < 0 ? "the finest with at most " + std::to_string(kAutoSenders) + " points" : asked);
+         l.sender_level < 0 ? "the finest with at most " + std::to_string(l.most_senders) + " points" : asked);
   decide(plan, "link rays", std::to_string(l.rays), step.surface.rays ? asked : effort.reason);
   decide(plan, "link oracle", short_text(double{l.oracle.split}) + ", " + short_text(double{l.oracle.largest}),
          effort.reason + std::string(": variation and size, of a receiver's light, above which a link is split"));

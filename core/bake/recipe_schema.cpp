@@ -81,7 +81,7 @@ std::string recipe_schema() {
         "rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "subdivide": {"$ref": "#/definitions/subdivide"},
-        "sender_level": {"description": "the finest level of points that send, from 0; auto: the finest with at most 12000 points", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 11}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+        "sender_level": {"description": "the finest level of points that send, from 0; auto: the finest with at most 6000 (draft), 12000 or 40000 (final) points", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 11}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
     },
     "grid": {

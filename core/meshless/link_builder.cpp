@@ -33,9 +33,9 @@ PointHierarchy coarse_part(const PointHierarchy& all, std::size_t levels) {
 }
 
 /// The finest level, at most `asked`, up to which there are no more points than may send.
-std::size_t sender_levels(const PointHierarchy& points, int asked) {
+std::size_t sender_levels(const PointHierarchy& points, int asked, std::uint32_t most_senders) {
   if (points.levels() == 0) return 0;
-  const std::uint32_t most = asked < 0 ? kAutoSenders : kMostSenders;
+  const std::uint32_t most = asked < 0 ? most_senders : kMostSenders;
   std::size_t level =
       asked < 0 ? points.levels() - 1 : std::min<std::size_t>(static_cast<std::size_t>(asked), points.levels() - 1);
   while (level > 0 && points.level_end[level] > most) --level;
@@ -75,7 +75,7 @@ struct LinkBuilder::Work {
       : tracer(t), params(p), placement(two_sided(p.points, t.scene())), faces(t.scene()), albedo(t.scene()) {
     begin_stage("points");
     all = place_points(tracer, faces, placement, threads);
-    coarse = coarse_part(all, sender_levels(all, params.sender_level));
+    coarse = coarse_part(all, sender_levels(all, params.sender_level, params.most_senders));
     for (std::size_t level = 0; level < all.levels(); ++level)
       stats.points.push_back(all.level_end[level] - all.begin(level));
     stats.senders = static_cast<std::uint32_t>(coarse.points.size());

@@ -28,11 +28,14 @@
 
 namespace kiln {
 
+inline constexpr std::uint32_t kAutoSenders = 12000;
+
 struct LinkParams {
   PointPlacement points;  // both_sides is set by the builder
-  int sender_level = -1;  // -1: the finest with at most kAutoSenders points
-  int rays = 1024;        // of a gather
-  float eps = 0.02F;      // prediction error that asks for finer points, of a lamp's mean light
+  int sender_level = -1;  // -1: the finest with at most `most_senders` points
+  std::uint32_t most_senders = kAutoSenders;
+  int rays = 1024;    // of a gather
+  float eps = 0.02F;  // prediction error that asks for finer points, of a lamp's mean light
   LinkOracle oracle, sender_oracle{.split = 0.01F, .largest = 0.08F};
   int bounces = -1;     // reflections; -1: all. 0: no links
   int neighbours = 10;  // of a vertex
@@ -42,7 +45,6 @@ struct LinkParams {
 
 inline constexpr int kProbes = 12, kFewestLinkSweeps = 4, kMostLinkSweeps = 48;
 inline constexpr double kLinkTail = 1e-3;
-inline constexpr std::uint32_t kAutoSenders = 12000;
 inline constexpr std::uint32_t kMostSenders = 48000;  // so that nodes fit 16 bits
 
 struct LinkStats {

@@ -1,9 +1,9 @@
 // Direct-to-indirect links: size, time and error on the shared scenes. One JSON line a run.
 //   kiln_transport [scene: cornell | dungeon | hotel | all] [name=value ...]
-// Values: points, levels, sender_level, rays, eps, split, largest, bounces; those not given are the defaults.
-// Error: relRMSE of reflected light at random points of the surface that can be seen, for lamps in random free places,
-// against paths; the links are read at the points themselves, so that no mesh comes in. Of each lamp: relRMSE, bias,
-// and error over the root mean square of the light instead of its mean.
+// Values: points, levels, sender_level, most_senders, rays, eps, split, largest, bounces; those not given are the
+// defaults. Error: relRMSE of reflected light at random points of the surface that can be seen, for lamps in random
+// free places, against paths; the links are read at the points themselves, so that no mesh comes in. Of each lamp:
+// relRMSE, bias, and error over the root mean square of the light instead of its mean.
 
 #include <algorithm>
 #include <cstdio>
@@ -128,6 +128,7 @@ void set_knob(LinkParams& params, const char* text) {
   if (name == "points") params.points.wanted = static_cast<std::uint64_t>(x);
   if (name == "levels") params.points.levels = static_cast<int>(x);
   if (name == "sender_level") params.sender_level = static_cast<int>(x);
+  if (name == "most_senders") params.most_senders = static_cast<std::uint32_t>(x);
   if (name == "rays") params.rays = static_cast<int>(x);
   if (name == "eps") params.eps = static_cast<float>(x);
   if (name == "split") params.oracle.split = static_cast<float>(x);
