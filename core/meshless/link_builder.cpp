@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kBlock = 128, kShareBlock = 512, kBatch = 4096;
 constexpr std::uint32_t kUnread = 0xffffffffU;
+constexpr int kMostLoneRays = 256;     // of a vertex that gathers for itself: scenes have many that nobody sees
 constexpr double kMostUnsteady = 0.9;  // factor that is believed when it has not become steady
 constexpr float kChildReach = 2;       // of the parent level's R
 
@@ -83,7 +84,7 @@ struct LinkBuilder::Work {
     senders.emplace(tracer.scene(), coarse, placement, threads);
     paths.emplace(SenderPaths::World{tracer, faces, albedo, *senders, nullptr, true});
     sender_rows.emplace(*paths, params.rays, params.seed);
-    lone_rows.emplace(*paths, params.rays, mix64(params.seed));
+    lone_rows.emplace(*paths, std::min(params.rays, kMostLoneRays), mix64(params.seed));
     links.sample_begin = {0}, links.child_begin = {0}, links.link_begin = {0};
   }
 

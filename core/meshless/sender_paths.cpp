@@ -7,12 +7,17 @@
 #include "core/sphere/sampling.h"
 
 namespace kiln {
+namespace {
+
+constexpr int kMostStrictSteps = 4;
+
+}  // namespace
 
 SenderPaths::End SenderPaths::follow(Hit hit, Vec3f direction, bool enclosed, Random& random,
                                      std::uint64_t& rays) const {
   const Mesh& mesh = world_.tracer.scene().mesh;
   End end;
-  for (;;) {
+  for (int step = 0; !world_.strict || step < kMostStrictSteps; ++step) {
     const HitSide side = world_.faces.side(hit.triangle, direction);
     if (side == HitSide::dark) return end;
     if (world_.faces.is_plain(hit.triangle)) {
@@ -60,6 +65,8 @@ SenderPaths::End SenderPaths::follow(Hit hit, Vec3f direction, bool enclosed, Ra
     ++rays;
     if (!hit) return end;
   }
+  end.sender = Senders::kNone;
+  return end;
 }
 
 /// Whether nothing stands between a place and its sender.

@@ -6,7 +6,8 @@
 // Emission that a ray meets is not counted: it is direct light of where the ray came from.
 // Strict  a sender answers only for places it can see: straight, or over what lies between when both rise along their
 //         normals by a quarter of their distance (surfaces that bulge hide neighbours a hair above them). Where the
-//         nearest does not, the next that does answers, so that a thin wall parts what lies on its two sides.
+//         nearest does not, the next that does answers, so that a thin wall parts what lies on its two sides. A path
+//         ends after four places without a sender: pockets smaller than the distance of points keep their light.
 // Error   the light of a sender's disk is taken as one.   Repeat  a pure function of its arguments
 
 #include <cstdint>
