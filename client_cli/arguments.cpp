@@ -145,6 +145,12 @@ void add_inspect(Program& program) {
       ->type_name("FILE");
 }
 
+void add_lamp(CLI::App* parser, std::string& lamp) {
+  parser->add_option("--light", lamp, "a point lamp (world metres, W/sr) in place of all other light")
+      ->type_name("X,Y,Z[,R,G,B]")
+      ->excludes("--env");
+}
+
 void add_eval(Program& program) {
   const auto command = add_command<EvalOptions>(program, "eval", "Light values from an artefact at points");
   auto& fields = *command.fields;
@@ -153,6 +159,8 @@ void add_eval(Program& program) {
       ->required()
       ->type_name("P.csv");
   add_light(command.parser, fields.light, kLightHelp + std::string("; the baked light when not given"));
+  add_lamp(command.parser, fields.lamp);
+  command.parser->add_flag("--indirect", fields.indirect, "with --light: reflected light only");
   command.parser->add_option("--sh-order", fields.sh_order, "only the first bands of the light; 0: all")
       ->check(CLI::Range(0, 10))
       ->type_name("N");
@@ -168,6 +176,7 @@ void add_reference(Program& program) {
       ->required()
       ->type_name("P.csv");
   add_light(command.parser, fields.light, kLightHelp + std::string("; only the scene's lamps when not given"));
+  add_lamp(command.parser, fields.lamp);
   command.parser->add_option("--samples", fields.samples, "paths for each point")
       ->check(CLI::Range(2, 1 << 24))
       ->type_name("N");

@@ -1,6 +1,7 @@
 // kiln eval FILE --points P.csv: light values from an artefact, decoded exactly as delivered.
 #include "client_cli/commands.h"
 #include "client_cli/files.h"
+#include "client_cli/lamp.h"
 #include "client_cli/light_lookup.h"
 #include "client_cli/models.h"
 #include "client_cli/recipe_input.h"
@@ -20,12 +21,33 @@ Outcome<ExitCode> run_grid(const EvalOptions& options, const std::vector<QueryPo
   return write_values({points, grid_values(grid, points), false}, 1, options.output, session);
 }
 
+Outcome<ExitCode> run_lamp(const EvalOptions& options, const std::vector<QueryPoint>& points, const Bytes& bytes,
+                           Session& session) {
+  KILN_TRY(lamp, parse_lamp(options.lamp));
+  KILN_TRY(baked, load_artefact(options.file));
+  KILN_TRY(links, or_failure(read_links(bytes, baked)));
+  if (links.vertices() == 0) {
+    return fail(ExitCode::usage, "no_links", "has no links for lights that move (step transport): leave out --light",
+                options.file);
+  }
+  say(options.indirect ? "reflected light of the lamp" : "the lamp: direct light by rays, reflected light by links");
+  Threads threads;
+  const StopTogether together(session.interrupt, threads);
+  const Places places = place_points(baked.scene, points, threads);
+  const double scale = baked.scene.frame.scale;
+  const LampLookup lookup{lamp, options.indirect, {options.scene_albedo, points}};
+  ValueTable table{points, lamp_values(std::move(baked), links, places, lookup, threads), false};
+  return write_values(table, scale, options.output, session);
+}
+
 }  // namespace
 
 Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
   KILN_TRY(points, read_points(options.points));
   KILN_TRY(bytes, read_file(options.file));
   if (kind_of(bytes) == FileKind::grid) return run_grid(options, points, session);
+  if (!options.lamp.empty()) return run_lamp(options, points, bytes, session);
+  if (options.indirect) return fail(ExitCode::usage, "indirect_of_what", "only goes with --light", "--indirect");
   KILN_TRY(baked, load_artefact(options.file));
   KILN_TRY(environment, load_light(options.light));
   if (environment && baked.transfer.order == 0) {

@@ -1,5 +1,6 @@
 // kiln reference IN --points P.csv: the path-traced truth at points of a scene, with its standard error.
 #include "client_cli/commands.h"
+#include "client_cli/lamp.h"
 #include "client_cli/light_lookup.h"
 #include "client_cli/models.h"
 #include "client_cli/recipe_input.h"
@@ -21,6 +22,10 @@ Outcome<ExitCode> run(const TruthOptions& options, Session& session) {
   KILN_TRY(scene, load_scene(options.input));
   KILN_TRY(environment, load_light(options.light));
   show_warnings(scene, session.terminal);
+  if (!options.lamp.empty()) {
+    KILN_TRY(lamp, parse_lamp(options.lamp));
+    light_only(scene, lamp);
+  }
   if (!environment && scene.lights.empty()) say("no --env: only emitters of the scene give light");
   Threads threads(options.threads);
   const StopTogether together(session.interrupt, threads);

@@ -71,12 +71,15 @@ struct InspectOptions {
 struct EvalOptions {
   std::string file, points, output;
   LightOptions light;
+  std::string lamp;       // of --light; empty: none
+  bool indirect = false;  // with a lamp: reflected light only
   bool scene_albedo = false;
   int sh_order = 0;
 };
 struct TruthOptions {
   std::string input, points, output;
   LightOptions light;
+  std::string lamp;  // of --light; empty: none
   bool scene_albedo = false;
   bool indirect = false;  // reflected light only, as a grid holds it
   int samples = 1024, bounces = -1, sh_order = 0, threads = 0;

@@ -16,6 +16,7 @@
 #include "core/bake/grid_step.h"
 #include "core/bake/job_light.h"
 #include "core/bake/lightings.h"
+#include "core/bake/links_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
 #include "core/bake/progressive.h"
@@ -85,6 +86,7 @@ Effort effort_of(const Recipe& recipe) {
 Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
   const Environment* sky = light ? &*light : nullptr;
   if (recipe.grid) return make_grid_plan(scene, recipe, sky, threads);
+  if (recipe.transport) return make_links_plan(scene, recipe, sky, threads);
   if (recipe.radiosity) return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, sky, threads);
   return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
 }
@@ -108,12 +110,13 @@ struct Pass {
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
+  std::optional<LinksOutcome> links;
   std::optional<GlossyReport> glossy;
 };
 
 /// The step `radiosity`, and where the plan has one the grid that looks at its surface.
 Result<Transfer> solve_light(const BakeInput& input, Scene& scene, const Environment* sky, Plan& plan,
-                             std::optional<GridOutcome>& grid, BakeLog& log, Threads& threads) {
+                             std::optional<GridOutcome>& grid, const LinksStep* links, BakeLog& log, Threads& threads) {
   plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
   Result<GridOutcome> outcome;
   const auto bake_grid = [&](const Tracer& tracer, const LitSurface* surface) {
@@ -121,7 +124,13 @@ Result<Transfer> solve_light(const BakeInput& input, Scene& scene, const Environ
     const SphereGather::World world{tracer, faces, surface, sky};
     outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
   };
-  Transfer transfer = solve_radiosity_step(scene, plan, sky, plan.grid ? OnLit(bake_grid) : OnLit{}, log, threads);
+  RadiosityHooks hooks;
+  if (plan.grid) hooks.lit = bake_grid;
+  if (links != nullptr) {
+    hooks.more = {links->columns(),
+                  [&](std::span<const TransferPoint> points) { return links->values(points, threads); }};
+  }
+  Transfer transfer = solve_radiosity_step(scene, plan, sky, hooks, log, threads);
   if (!outcome) return tl::make_unexpected(outcome.error());
   if (plan.grid) grid = std::move(*outcome);
   return transfer;
@@ -133,9 +142,15 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   Pass pass;
   BakedLight own;
   Transport transport;
+  std::unique_ptr<LinksStep> links;
   if (plan.radiosity) {
     if (light) own.name = light->name;
-    KILN_TRY(transfer, solve_light(input, scene, light ? &*light : nullptr, plan, pass.grid, log, threads));
+    if (plan.links) {
+      log.begin("links", 0.4);
+      links = std::make_unique<LinksStep>(scene, plan, input.recipe.seed, log, threads);
+    }
+    KILN_TRY(transfer,
+             solve_light(input, scene, light ? &*light : nullptr, plan, pass.grid, links.get(), log, threads));
     transport.transfer = std::move(transfer);
   } else {
     if (light) own = {light->name, project_environment(*light, plan.order)};
@@ -155,6 +170,12 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   baked = {};  // from here on the delivered file is what counts
   KILN_TRY(decoded, reopen(glb, scene));
   threads.check();
+  if (links) {
+    log.begin("read links", 0.93);
+    KILN_TRY(outcome, links->finish(glb, decoded, input.recipe, threads));
+    pass.links = std::move(outcome);
+    streams.push_back({"links", pass.links->bytes});
+  }
   if (input.recipe.certificate) {
     log.begin("certificate", 1.0);
     const Tracer truth(scene, threads);
@@ -281,6 +302,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .certificate = pass.certificate,
                                           .sources = pass.sources,
                                           .grid = pass.grid,
+                                          .links = pass.links,
                                           .glossy = pass.glossy,
                                           .passes = passes});
   BakeOutput output;

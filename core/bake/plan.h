@@ -11,6 +11,7 @@
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
+#include "core/meshless/link_builder.h"
 #include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
 #include "core/scene/environment.h"
@@ -42,6 +43,7 @@ struct Plan {
   GlossyPlan glossy;
   std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
+  std::optional<LinkParams> links;     // of the step `transport`; `radiosity` is there too
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

@@ -195,8 +195,8 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality 
   return plan;
 }
 
-Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const OnLit& lit, BakeLog& log,
-                              Threads& threads) {
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const RadiosityHooks& hooks,
+                              BakeLog& log, Threads& threads) {
   Radiosity params = *plan.radiosity;
   log.begin("direct", plan.grid ? 0.3 : 0.55);
   {
@@ -209,14 +209,20 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
     const float scale = mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
     const auto columns = [&](std::span<const TransferPoint> batch, const DirectLight& from) {
       std::vector<float> out;
-      for (const Vec3f& x : light_at(batch, from, params.seed, rays, threads)) {
+      const std::vector<float> more = hooks.more.width > 0 ? hooks.more.values(batch) : std::vector<float>{};
+      const std::vector<Vec3f> light_there = light_at(batch, from, params.seed, rays, threads);
+      for (std::size_t i = 0; i < batch.size(); ++i) {
+        const Vec3f& x = light_there[i];
         out.insert(out.end(), {x.x * scale, x.y * scale, x.z * scale});
+        for (std::size_t k = 0; k < hooks.more.width; ++k)
+          out.push_back(kOpenConstantBand * more[i * hooks.more.width + k]);
       }
       points += batch.size();
       log.advance(std::min(points, expected), expected);
       return out;
     };
-    const ValueSource source{.width = 3,
+    const std::size_t width = 3 + hooks.more.width;
+    const ValueSource source{.width = width,
                              .values = [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
                              .bounded = {0, 1, 2},
                              .hidden = hidden_test(tracer),
@@ -228,7 +234,7 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
     params.stand_ins = std::move(fine.stand_ins);
     params.known_direct.resize(fine.mesh.position.size());
     for (std::size_t v = 0; v < params.known_direct.size(); ++v) {
-      const float* x = &fine.values[3 * v];
+      const float* x = &fine.values[width * v];
       params.known_direct[v] = Vec3f{std::max(0.0F, x[0]), std::max(0.0F, x[1]), std::max(0.0F, x[2])} / scale;
     }
     scene.mesh = std::move(fine.mesh);
@@ -246,7 +252,7 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
          "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
              " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
 
-  if (lit) lit(tracer, r.surface.get());
+  if (hooks.lit) hooks.lit(tracer, r.surface.get());
 
   Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
   out.coefficients.reserve(3 * r.direct.size());

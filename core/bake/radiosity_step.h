@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "core/bake/bake_log.h"
 #include "core/bake/plan.h"
@@ -23,7 +25,19 @@ Plan make_radiosity_plan(const Scene&, const RadiosityStep&, Quality, const Envi
 /// Called while the solved surface stands: null where nothing is reflected.
 using OnLit = std::function<void(const Tracer&, const LitSurface*)>;
 
+/// Other light that the mesh is refined for: `width` numbers for each place, 1 in the mean.
+struct MoreLight {
+  std::size_t width = 0;
+  std::function<std::vector<float>(std::span<const TransferPoint>)> values = {};
+};
+
+struct RadiosityHooks {
+  OnLit lit = {};
+  MoreLight more = {};
+};
+
 /// Refines scene.mesh as planned and solves for the light at its vertices. Adds to plan.decisions what it found.
-Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const OnLit&, BakeLog&, Threads&);
+Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const RadiosityHooks&, BakeLog&,
+                              Threads&);
 
 }  // namespace kiln

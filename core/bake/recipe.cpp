@@ -151,6 +151,12 @@ RadiosityStep read_radiosity(JsonFields& fields, const std::string& pointer, Err
   return step;
 }
 
+TransportStep read_transport(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  TransportStep step{.surface = read_radiosity(fields, pointer, errors), .sender_level = {}};
+  if (const auto level = fields.integer_or_auto("sender_level", 0, 11)) step.sender_level = static_cast<int>(*level);
+  return step;
+}
+
 std::optional<std::array<int, 3>> read_resolution(JsonFields& fields) {
   const json* field = fields.find("resolution");
   if (!field || *field == "auto") return std::nullopt;
@@ -202,14 +208,15 @@ ReduceStep read_reduce(JsonFields& fields) {
 bool read_step(const json& value, const std::string& pointer, Recipe& recipe, Errors& errors) {
   JsonFields fields(value, pointer, errors);
   if (!fields.find("do", true)) return false;
-  const auto step = fields.word("do", {"prt", "radiosity", "grid", "reduce"});
+  const auto step = fields.word("do", {"prt", "radiosity", "grid", "transport", "reduce"});
   if (!step) return false;
   if (*step == 0) recipe.steps.push_back(read_prt(fields, pointer, errors));
   if (*step == 1) recipe.radiosity = read_radiosity(fields, pointer, errors);
   if (*step == 2) recipe.grid = read_grid(fields);
-  if (*step == 3) recipe.reduce = read_reduce(fields);
+  if (*step == 3) recipe.transport = read_transport(fields, pointer, errors);
+  if (*step == 4) recipe.reduce = read_reduce(fields);
   fields.finish();
-  return *step == 3;
+  return *step == 4;
 }
 
 void read_steps(const json& value, Recipe& recipe, Errors& errors) {
@@ -225,7 +232,7 @@ void read_steps(const json& value, Recipe& recipe, Errors& errors) {
   if (errors.size() > before) return;
   if (!first || second) {
     errors.push_back({"/steps", "only reduce may come before another step, and once", shown(value),
-                      "reduce, then one of prt, radiosity, grid"});
+                      "reduce, then one of prt, radiosity, grid, transport"});
   }
 }
 
@@ -256,6 +263,10 @@ void check_promise(const Recipe& recipe, Errors& errors) {
   if (recipe.radiosity) {
     errors.push_back(
         {"/quality", "cannot be promised of a radiosity step: it is baked in one pass", "", "draft, standard, final"});
+  }
+  if (recipe.transport) {
+    errors.push_back(
+        {"/quality", "cannot be promised of a transport step: it is baked in one pass", "", "draft, standard, final"});
   }
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
@@ -388,6 +399,13 @@ json step_json(const RadiosityStep& step) {
           {"subdivide", subdivision_json(step.subdivide)}};
 }
 
+json step_json(const TransportStep& step) {
+  json out = step_json(step.surface);
+  out["do"] = "transport";
+  out["sender_level"] = or_auto(step.sender_level);
+  return out;
+}
+
 json step_json(const GridStep& step) {
   json out = {{"do", "grid"},
               {"resolution", "auto"},
@@ -442,6 +460,7 @@ std::string recipe_json(const Recipe& recipe) {
   for (const PrtStep& step : recipe.steps) out["steps"].push_back(step_json(step));
   if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
   if (recipe.grid) out["steps"].push_back(step_json(*recipe.grid));
+  if (recipe.transport) out["steps"].push_back(step_json(*recipe.transport));
   if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
   if (const json environment = environment_json(recipe.environment); !environment.is_null())
     out["environment"] = environment;
@@ -462,6 +481,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"radiosity"}],"environment":{"builtin":"clear"}})"},
       {"grid", "Indirect light in a grid, for what moves in the scene; the scene itself lit as by radiosity",
        R"({"steps":[{"do":"grid"}],"environment":{"builtin":"clear"}})"},
+      {"transport", "Reflected light of lights that move after the bake; the scene itself lit as by radiosity",
+       R"({"steps":[{"do":"transport"}],"environment":{"builtin":"clear"}})"},
       {"reduce", "A scan of any size down to a tenth, at most 200,000 triangles, with a normal map",
        R"({"steps":[{"do":"reduce"}]})"},
       {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},

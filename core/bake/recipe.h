@@ -76,6 +76,12 @@ struct GridStep {
   std::optional<int> samples;  // rays of a vertex
 };
 
+/// Links for lights that move (core/meshless/link_builder.h), and the scene lit as by RadiosityStep.
+struct TransportStep {
+  RadiosityStep surface;            // what the two have in common
+  std::optional<int> sender_level;  // the finest level of points that send; auto when absent
+};
+
 /// Fewer triangles, and a normal map for what they do not hold (core/reduce/reduce.h).
 struct ReduceStep {
   std::optional<std::uint64_t> triangles;  // auto when this and `ratio` are absent
@@ -106,6 +112,7 @@ struct Recipe {
   std::vector<PrtStep> steps;              // one, or none where there is a
   std::optional<RadiosityStep> radiosity;  // step `radiosity`
   std::optional<GridStep> grid;            // step `grid`
+  std::optional<TransportStep> transport;  // step `transport`
   std::optional<ReduceStep> reduce;        // step `reduce`: alone, or before one of the others
   Quality quality = Quality::standard;     // where nothing is promised
   Promise promise;
@@ -115,7 +122,7 @@ struct Recipe {
   bool certificate = true;
   std::string label;
 
-  bool bakes_light() const { return !steps.empty() || radiosity || grid; }
+  bool bakes_light() const { return !steps.empty() || radiosity || grid || transport; }
 };
 
 /// Parses and checks a recipe. All mistakes at once.

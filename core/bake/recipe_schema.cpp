@@ -65,6 +65,25 @@ std::string recipe_schema() {
         "subdivide": {"$ref": "#/definitions/subdivide"}
       }
     },
+    "transport": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "properties": {
+        "do": {"enum": ["transport"]},
+        "scheme": {"description": "rows: the transport operator is traced once and kept", "enum": ["rows"], "default": "rows"},
+        "points": {
+          "type": "object", "additionalProperties": false,
+          "properties": {
+            "radius": {"description": "of the coarsest points, metres", "anyOf": [{"type": "number", "minimum": 1e-9, "maximum": 1e12}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+            "levels": {"description": "each halves the radius", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 12}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+          }
+        },
+        "eps_irradiance": {"description": "prediction error that asks for finer points, of the mean light", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "subdivide": {"$ref": "#/definitions/subdivide"},
+        "sender_level": {"description": "the finest level of points that send, from 0; auto: the finest with at most 6000 (draft), 12000 or 40000 (final) points", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 11}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+      }
+    },
     "grid": {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "properties": {
@@ -76,7 +95,7 @@ std::string recipe_schema() {
         "samples": {"description": "rays of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
     },
-    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}]},
+    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}, {"$ref": "#/definitions/transport"}]},
     "reduce": {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "not": {"required": ["triangles", "ratio"], "properties": {"triangles": {"type": "integer"}}},

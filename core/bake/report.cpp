@@ -131,6 +131,42 @@ ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
   return out;
 }
 
+ordered_json links_certificate_object(const std::optional<LinksCertificate>& certificate) {
+  if (!certificate) return nullptr;
+  ordered_json out = error_object(certificate->error);
+  out["of_rms"] = certificate->of_rms;
+  out["lamps"] = ordered_json::array();
+  for (std::size_t k = 0; k < certificate->lamps.size(); ++k) {
+    const Vec3d& at = certificate->lamps[k];
+    out["lamps"].push_back(
+        {{"place", {at.x, at.y, at.z}},
+         {"relrmse", k < certificate->error.by_lighting.size() ? certificate->error.by_lighting[k] : 0},
+         {"mean_light", certificate->mean_light[k]}});
+  }
+  out["dark"] = certificate->dark;
+  out["points"] = certificate->points;
+  out["samples"] = certificate->samples;
+  out["rays"] = certificate->rays;
+  out["seconds"] = certificate->seconds;
+  return out;
+}
+
+ordered_json links_object(const LinksOutcome& links) {
+  return {{"senders", links.links.senders},
+          {"sender_level", links.stats.sender_level},
+          {"receivers", links.links.rows() - links.links.senders},
+          {"alone", links.stats.alone},
+          {"nodes", links.links.nodes()},
+          {"links", links.links.links.size()},
+          {"share_of_possible", links.links.share_of_possible()},
+          {"sweeps", links.links.sweeps},
+          {"tail", links.links.tail},
+          {"left_after_sweeps", links.stats.left},
+          {"rays", links.stats.rays},
+          {"bytes", links.bytes},
+          {"certificate", links_certificate_object(links.certificate)}};
+}
+
 ordered_json glossy_object(const GlossyReport& g) {
   ordered_json out = {{"order", g.order}, {"channels", g.channels},       {"vertices", g.vertices},
                       {"rank", g.rank},   {"compression", g.compression}, {"noise", g.noise}};
@@ -167,6 +203,14 @@ ordered_json radiosity_parameters(const Plan& plan) {
 ordered_json parameters_object(const Plan& plan) {
   if (plan.radiosity) {
     ordered_json out = radiosity_parameters(plan);
+    if (plan.links) {
+      const LinkParams& l = *plan.links;
+      out["links"] = {{"rays", l.rays},
+                      {"eps", l.eps},
+                      {"split", l.oracle.split},
+                      {"largest", l.oracle.largest},
+                      {"sender_level", l.sender_level < 0 ? ordered_json("auto") : ordered_json(l.sender_level)}};
+    }
     if (plan.grid) out["grid"] = {{"size", plan.grid->size}, {"rays_per_vertex", plan.grid->rays}};
     return out;
   }
@@ -253,6 +297,7 @@ std::string report_json(const ReportInput& in) {
                       {"certificate", certificate_object(in.certificate)}};
   if (in.sources) out["error_sources"] = sources_object(*in.sources);
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
+  if (in.links) out["links"] = links_object(*in.links);
   if (in.recipe.promise)
     out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);

@@ -9,6 +9,7 @@
 #include "core/bake/certificate.h"
 #include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_outcome.h"
+#include "core/bake/links_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/progressive.h"
 
@@ -36,6 +37,7 @@ struct ReportInput {
   const std::optional<Certificate>& certificate;
   const std::optional<ErrorSources>& sources;
   const std::optional<GridOutcome>& grid;
+  const std::optional<LinksOutcome>& links;
   const std::optional<GlossyReport>& glossy;
   const Passes& passes;  // none where a quality was asked for
 };

@@ -89,10 +89,21 @@ Vec3f GatherRows::apply(std::size_t index, std::span<const Vec3f> senders) const
 
 VectorValue GatherRows::apply_vector(std::size_t index, const TransferPoint& point,
                                      std::span<const Vec3f> senders) const {
+  VectorValue out{row_[index].constant, {}};
+  for (const Ray& ray : rays_of(index, point)) {
+    const Vec3f light = ray.value * senders[ray.sender];
+    out.value += light;
+    for (std::size_t c = 0; c < 3; ++c) out.turn[c] += ray.aside * light[c];
+  }
+  return out;
+}
+
+std::vector<GatherRows::Ray> GatherRows::rays_of(std::size_t index, const TransferPoint& point) const {
   const Row& row = row_[index];
   const LocalFrame frame = local_frame(sets_, point.normal, seed_, point_key(point));
   const float unit = 1.0F / 65535 / static_cast<float>(sets_.samples());
-  VectorValue out{row.constant, {}};
+  std::vector<Ray> out;
+  out.reserve(row.count);
   Rays16 rays;
   int packet = -1;
   for (std::uint32_t k = 0; k < row.count; ++k) {
@@ -101,12 +112,10 @@ VectorValue GatherRows::apply_vector(std::size_t index, const TransferPoint& poi
     const std::size_t lane = entry.ray % kPacket;
     const Vec3f w{rays.dx[lane], rays.dy[lane], rays.dz[lane]};
     const float cosine = dot(w, point.normal);
-    const Vec3f aside = (w - point.normal * cosine) / std::max(cosine, kGrazing);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float light = static_cast<float>(entry.albedo[c]) * unit * senders[entry.sender][c];
-      out.value[c] += light;
-      out.turn[c] += aside * light;
-    }
+    Ray& ray = out.emplace_back();
+    ray.sender = entry.sender;
+    ray.aside = (w - point.normal * cosine) / std::max(cosine, kGrazing);
+    for (std::size_t c = 0; c < 3; ++c) ray.value[c] = static_cast<float>(entry.albedo[c]) * unit;
   }
   return out;
 }

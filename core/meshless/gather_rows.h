@@ -59,6 +59,15 @@ class GatherRows {
   /// Equations 1 and 2; c_p has no direction. `point` is the one that the row was traced for.
   VectorValue apply_vector(std::size_t row, const TransferPoint& point, std::span<const Vec3f> senders) const;
 
+  /// One ray of a row: its share of equation 1 for a sender of 1, and w / (n . w) - n of equation 2.
+  struct Ray {
+    std::uint32_t sender = 0;
+    Vec3f value, aside;
+  };
+  /// Of each entry of the row, in order; `point` is the one that the row was traced for.
+  std::vector<Ray> rays_of(std::size_t row, const TransferPoint& point) const;
+  int rays() const { return sets_.samples(); }
+
  private:
   static constexpr std::size_t kChunk = 64;  // rows: one unit of work and of memory
   struct Row {

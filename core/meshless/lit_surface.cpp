@@ -16,8 +16,8 @@ LitSurface::LitSurface(const Tracer& tracer, const Environment* sky, const Point
       albedo_(tracer.scene()),
       path_light_(tracer, sky, kOnPaths),
       points_(place_points(tracer, faces_, placement, threads)),
-      senders_(tracer.scene(), points_, placement.groups_by_part, threads),
-      paths_({tracer_, faces_, albedo_, senders_, path_light_}),
+      senders_(tracer.scene(), points_, placement, threads),
+      paths_({tracer_, faces_, albedo_, senders_, &path_light_}),
       light_(points_.points.size()) {}
 
 void LitSurface::set_light(std::vector<Vec3f> light) {

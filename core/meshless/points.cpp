@@ -67,6 +67,14 @@ MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2<do
   return p;
 }
 
+/// The same place on the back of its face.
+MeshlessPoint behind(MeshlessPoint p) {
+  p.site.normal = -p.site.normal;
+  p.face_normal = -p.face_normal;
+  p.behind = true;
+  return p;
+}
+
 /// Equation 1.
 bool has_room(const PointGrid& grid, const std::vector<MeshlessPoint>& points, const SurfaceSite& at, float radius) {
   bool room = true;
@@ -101,9 +109,11 @@ TransferPoint transfer_point(const MeshlessPoint& p) {
   return {p.site.position, p.site.normal, p.site.position, p.face_normal};
 }
 
-bool is_enclosed(const Tracer& tracer, const GatherFaces& faces, const TransferPoint& p) {
+bool is_enclosed(const Tracer& tracer, const GatherFaces& faces, const TransferPoint& p, bool both_sides) {
   const Hit hit = tracer.closest(ray_origin(p), p.normal, kFar);
-  return hit && faces.side(hit.triangle, p.normal) != HitSide::front;
+  if (!hit) return false;
+  const HitSide side = faces.side(hit.triangle, p.normal);
+  return both_sides ? side == HitSide::dark : side != HitSide::front;
 }
 
 PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, const PointPlacement& asked,
@@ -112,6 +122,7 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
   const PointPlacement params = resolve(asked, scene);
   EXPECTS(params.levels <= kMaxPointLevels && std::isfinite(params.radius));
   const AreaSampler triangles(scene.mesh);
+  const bool two_sided = params.both_sides > 0;
   PointHierarchy out;
   if (!(triangles.total() > 0)) return out;
   EXPECTS(expected_points(triangles.total(), std::ldexp(params.radius, 1 - params.levels)) < 0x1p31);
@@ -121,15 +132,17 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
     PointGrid grid(2 * radius);
     for (std::uint32_t i = 0; i < out.points.size(); ++i) grid.add(i, out.points[i].site.position);
     Random random(params.seed, static_cast<std::uint64_t>(level));
-    const double wanted = kProposals * triangles.total() / (double{radius} * radius);
+    const bool both = level < params.both_sides;
+    const double wanted = (both ? 2 : 1) * kProposals * triangles.total() / (double{radius} * radius);
     const auto proposals = static_cast<std::uint64_t>(std::ceil(wanted)) + kProposals;
     for (std::uint64_t k = 0; k < proposals; ++k) {
       if (k % 4096 == 0) threads.check();
       const std::uint32_t triangle = triangles.pick(random.uniform_double());
       const double a = random.uniform_double(), b = random.uniform_double();
-      const MeshlessPoint p = point_on(scene, triangle, uniform_triangle({a, b}), params.groups_by_part);
+      MeshlessPoint p = point_on(scene, triangle, uniform_triangle({a, b}), params.groups_by_part);
+      if (both && is_double_sided(scene, triangle) && random.uniform() < 0.5F) p = behind(p);
       if (!has_room(grid, out.points, p.site, radius)) continue;
-      if (is_enclosed(tracer, faces, transfer_point(p))) continue;
+      if (is_enclosed(tracer, faces, transfer_point(p), two_sided)) continue;
       grid.add(static_cast<std::uint32_t>(out.points.size()), p.site.position);
       out.points.push_back(p);
     }

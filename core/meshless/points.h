@@ -5,7 +5,8 @@
 // Paper   Lehtinen et al. 2007, section 6.1.
 // Side    points stand on the side that vertices have light for (GatherFaces): of double-sided faces that of the vertex
 //         normals, of others the front. A point whose normal's ray first meets a back is taken to be inside a solid and
-//         refused.
+//         refused. On the first `both_sides` levels double-sided faces have points on their backs as well; then only
+//         the back of a single-sided face tells the inside of a solid.
 // Differs A level ends after a number of proposals that follows from the area: kProposals A / R^2. The paper waits for
 //         1000 rejections in a row, which takes seconds on fine levels and no known time on crumpled surfaces. Of a
 //         smooth surface .5 % is then farther than R from every point and nothing farther than 1.5 R (measured).
@@ -34,12 +35,14 @@ struct MeshlessPoint {
   Vec3f face_normal;  // on the side of the point
   std::uint32_t triangle = 0;
   float u = 0, v = 0;
+  bool behind = false;  // on the back of a double-sided face
 };
 
 struct PointPlacement {
   float radius = 0;             // R of level 0; 0: auto, so that all levels together have about `wanted` points
   int levels = 0;               // 0: auto
   std::uint64_t wanted = 0;     // points on all levels where the radius is auto; 0: auto
+  int both_sides = 0;           // levels with points on both sides of double-sided faces
   bool groups_by_part = false;  // each part is a reconstruction group of its own; else the scene is one
   std::uint64_t seed = 0;
 };
@@ -65,8 +68,9 @@ double expected_points(double area, double radius);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
 
-/// Whether the first thing in the direction of the normal is a back: the site is inside a solid.
-bool is_enclosed(const Tracer&, const GatherFaces&, const TransferPoint&);
+/// Whether the first thing in the direction of the normal is a back (`both_sides`: of a single-sided face): the site is
+/// inside a solid.
+bool is_enclosed(const Tracer&, const GatherFaces&, const TransferPoint&, bool both_sides = false);
 
 /// What ray_origin takes.
 TransferPoint transfer_point(const MeshlessPoint&);

@@ -9,7 +9,8 @@ namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 1024;
-constexpr float kReach = 2;  // of R
+constexpr float kReach = 2;            // of R
+constexpr std::size_t kMostAsked = 8;  // of those within reach
 
 bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
@@ -29,10 +30,11 @@ Vec2f from_uv(std::uint8_t corner, float u, float v) {
 
 }  // namespace
 
-Senders::Senders(const Scene& scene, const PointHierarchy& points, bool groups_by_part, Threads& threads)
+Senders::Senders(const Scene& scene, const PointHierarchy& points, const PointPlacement& placement, Threads& threads)
     : scene_(scene),
       points_(points),
-      groups_by_part_(groups_by_part),
+      groups_by_part_(placement.groups_by_part),
+      both_sides_(placement.both_sides > 0),
       finest_(points.radius.empty() ? 1.0F : points.radius.back()),
       grid_(2 * finest_) {
   for (std::uint32_t i = 0; i < points.points.size(); ++i) grid_.add(i, points.points[i].site.position);
@@ -45,6 +47,7 @@ Senders::Senders(const Scene& scene, const PointHierarchy& points, bool groups_b
     cells += std::uint32_t{faces_[t].columns} * faces_[t].rows;
   }
   cells_.assign(cells, kNone);
+  if (both_sides_) back_cells_.assign(cells, kNone);
   threads.for_blocks(triangles, kBlock, [&](std::size_t begin, std::size_t end) {
     for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) fill(t);
   });
@@ -79,7 +82,12 @@ void Senders::fill(std::uint32_t triangle) {
         a /= sum, b /= sum;
       }
       const Vec2f uv = to_uv(f.corner, a, b);
-      cells_[f.begin + j * f.columns + i] = nearest(site_on(triangle, uv.x, uv.y));
+      SurfaceSite site = site_on(triangle, uv.x, uv.y);
+      const std::uint32_t cell = f.begin + j * f.columns + i;
+      cells_[cell] = nearest(site);
+      if (!both_sides_ || !is_double_sided(scene_, triangle)) continue;
+      site.normal = -site.normal;
+      back_cells_[cell] = nearest(site);
     }
   }
 }
@@ -112,9 +120,44 @@ std::uint32_t Senders::nearest(const SurfaceSite& at) const {
   return kNone;
 }
 
+std::uint32_t Senders::nearest(const SurfaceSite& at, const std::function<bool(std::uint32_t)>& suits) const {
+  struct Candidate {
+    float scaled;
+    std::uint32_t point;
+  };
+  std::vector<Candidate> found;
+  const float reach = kReach * finest_;
+  grid_.near(at.position, reach, [&](std::uint32_t i, float d2) {
+    const SurfaceSite& q = points_.points[i].site;
+    const float cosine = dot(q.normal, at.normal);
+    if (q.group != at.group || cosine <= 0 || d2 > reach * reach * cosine * cosine) return;
+    found.push_back({d2 / (cosine * cosine), i});
+  });
+  std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
+    return a.scaled != b.scaled ? a.scaled < b.scaled : a.point < b.point;
+  });
+  if (found.size() > kMostAsked) found.resize(kMostAsked);
+  for (const Candidate& c : found) {
+    if (suits(c.point)) return c.point;
+  }
+  return kNone;
+}
+
 std::uint32_t Senders::at(std::uint32_t triangle, float u, float v) const {
   const Face& f = faces_[triangle];
-  if (f.columns == 0) return nearest(site_on(triangle, u, v));
+  return f.columns == 0 ? nearest(site_on(triangle, u, v)) : cells_[cell_at(f, u, v)];
+}
+
+std::uint32_t Senders::behind(std::uint32_t triangle, float u, float v) const {
+  if (!both_sides_) return kNone;
+  const Face& f = faces_[triangle];
+  if (f.columns > 0) return back_cells_[cell_at(f, u, v)];
+  SurfaceSite site = site_on(triangle, u, v);
+  site.normal = -site.normal;
+  return nearest(site);
+}
+
+std::uint32_t Senders::cell_at(const Face& f, float u, float v) const {
   const Vec2f at = from_uv(f.corner, u, v);
   const auto cell = [](float x, std::uint16_t cells) {
     return static_cast<std::uint32_t>(std::clamp(static_cast<int>(x * cells), 0, cells - 1));
@@ -123,7 +166,7 @@ std::uint32_t Senders::at(std::uint32_t triangle, float u, float v) const {
   const std::uint32_t j = cell(at.y, f.rows);
   // A hit on the far edge may round into a cell that is outside.
   while (i > 0 && i * f.rows + j * f.columns >= std::uint32_t{f.columns} * f.rows) --i;
-  return cells_[f.begin + j * f.columns + i];
+  return f.begin + j * f.columns + i;
 }
 
 }  // namespace kiln

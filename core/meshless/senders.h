@@ -6,10 +6,12 @@
 // Table    each triangle is cut into cells of at most R x R along two of its edges, and a cell answers once for all, as
 //          at its centre: a hit costs one read. Only triangles for which that takes far more cells than their area
 //          deserves (blunt needles) are looked up.
+// Backs    of double-sided faces have cells of their own where points stand on both sides.
 // Memory   12 bytes a triangle, 4 a cell: about three cells a point
 // Repeat   a pure function of its arguments: of two equally near points the first counts
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/base/threads.h"
@@ -25,12 +27,17 @@ class Senders {
   static constexpr std::uint32_t kNone = 0xffffffffU;
 
   /// Keeps references to both.
-  Senders(const Scene&, const PointHierarchy&, bool groups_by_part, Threads&);
+  Senders(const Scene&, const PointHierarchy&, const PointPlacement&, Threads&);
 
   /// The point nearest to a site, or kNone.
   std::uint32_t nearest(const SurfaceSite&) const;
+  /// The nearest within reach that `suits`, or kNone. Asks nearer ones first, eight at most.
+  std::uint32_t nearest(const SurfaceSite&, const std::function<bool(std::uint32_t)>& suits) const;
   /// The same at a hit on the lit side of a face.
   std::uint32_t at(std::uint32_t triangle, float u, float v) const;
+  /// The same on the back of a double-sided face; kNone where no points stand on backs.
+  std::uint32_t behind(std::uint32_t triangle, float u, float v) const;
+  const SurfaceSite& site(std::uint32_t sender) const { return points_.points[sender].site; }
   void prefetch(std::uint32_t triangle) const { __builtin_prefetch(&faces_[triangle]); }
   /// Where rays of a sender start.
   Vec3f origin(std::uint32_t sender) const { return ray_origin(transfer_point(points_.points[sender])); }
@@ -45,14 +52,15 @@ class Senders {
   Face cut(std::uint32_t triangle) const;
   void fill(std::uint32_t triangle);
   SurfaceSite site_on(std::uint32_t triangle, float u, float v) const;
+  std::uint32_t cell_at(const Face&, float u, float v) const;
 
   const Scene& scene_;
   const PointHierarchy& points_;
-  bool groups_by_part_;
+  bool groups_by_part_, both_sides_;
   float finest_ = 0;
   PointGrid grid_;
   std::vector<Face> faces_;
-  std::vector<std::uint32_t> cells_;
+  std::vector<std::uint32_t> cells_, back_cells_;
 };
 
 }  // namespace kiln

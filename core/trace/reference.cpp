@@ -64,7 +64,7 @@ class Estimator {
   }
 
   std::size_t lightings() const {
-    return light_.environments.size() + light_.sh.size() + (light_.scene_lights ? 1 : 0);
+    return light_.environments.size() + light_.sh.size() + light_.lamps.size() + (light_.scene_lights ? 1 : 0);
   }
 
   /// Adds one path from `start` to sum[lighting]. Returns its vertices.
@@ -78,6 +78,7 @@ class Estimator {
   std::uint64_t rays_per_vertex() const {
     std::uint64_t rays = 1;
     for (const EnvironmentSampler& sampler : samplers_) rays += sampler.useful() ? 1 : 0;
+    rays += light_.lamps.size();
     if (light_.scene_lights) rays += (emitters_.empty() ? 0 : 1) + scene_.lights.size();
     return rays;
   }
@@ -162,6 +163,8 @@ Vec3d Estimator::punctual_light(const Vertex& v, const Light& light) const {
 
 void Estimator::add_lamps(const Vertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
                           std::vector<Vec3d>& sum) const {
+  const std::size_t first = light_.environments.size() + light_.sh.size();
+  for (std::size_t k = 0; k < light_.lamps.size(); ++k) sum[first + k] += weight * punctual_light(v, light_.lamps[k]);
   if (!light_.scene_lights) return;
   Vec3d light;
   if (!emitters_.empty()) light += emitter_light(v, numbers.number(), numbers.pair(depth));

@@ -35,6 +35,7 @@ struct ReferenceLight {
   std::vector<Environment> environments;  // each is one lighting
   int sh_order = 0;                       // > 0: `sh` holds further lightings, one per entry
   std::vector<std::vector<Vec3f>> sh;     // [lighting][sh_count(sh_order)]
+  std::vector<Light> lamps;               // each is one more lighting: a punctual light of its own
   bool scene_lights = false;              // one more lighting, last: emitters and punctual lights of the scene
 };
 

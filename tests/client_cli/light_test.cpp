@@ -229,5 +229,37 @@ TEST_F(Light, AGridIsAskedAsAnArtefactIsAndAgreesWithTheReflectedLightOfTheRefer
   EXPECT_EQ(facts["grid"]["size"], (std::vector<int>{10, 10, 10}));
 }
 
+TEST_F(Light, ALampThatMovesIsAskedOfLinksAndAgreesWithTheReference) {
+  const std::string room = folder.path("room.glb");
+  ASSERT_EQ(run_kiln({"demo-scene", "room", "-o", room}).exit, 0);
+  const std::string recipe = folder.write(
+      "r.json", R"({"steps":[{"do":"transport","rays":256,"subdivide":{"triangles":6000}}],"quality":"draft"})");
+  const Ran baked = run_kiln({"bake", room, "-r", recipe, "-o", folder.path("out")});
+  ASSERT_EQ(baked.exit, 0) << baked.err;
+  const std::string points = draw(room, 300), scene = folder.path("out/scene.glb");
+  const json lamps = json::parse(folder.read("out/report.json"))["links"]["certificate"]["lamps"];
+  const json at = lamps[0]["place"];
+  const std::string lamp = "--light=" + at[0].dump() + "," + at[1].dump() + "," + at[2].dump() + ",4,2,1";
+  for (const bool indirect : {true, false}) {
+    std::vector<std::string> ask{"eval", scene, "--points", points, lamp};
+    std::vector<std::string> truth_of{"reference", room, "--points", points, lamp, "--samples", "256"};
+    if (indirect) ask.push_back("--indirect"), truth_of.push_back("--indirect");
+    const ValueTable stored = values(ask), truth = values(truth_of);
+    ASSERT_EQ(stored.values.size(), 300U);
+    double apart = 0, mean = 0;
+    for (std::size_t i = 0; i < 300; ++i) {
+      apart += std::abs(stored.values[i].irradiance.x - truth.values[i].irradiance.x) / 300;
+      mean += truth.values[i].irradiance.x / 300;
+    }
+    std::printf("mean distance %.4f of the mean\n", apart / mean);
+    EXPECT_GT(mean, 0);
+    EXPECT_LT(apart / mean, 0.15);  // the reference's own noise of 256 paths, and links at draft
+  }
+  EXPECT_EQ(run_kiln({"eval", scene, "--points", points, "--light", "1,2"}).exit, 2);
+  EXPECT_EQ(run_kiln({"eval", scene, "--points", points, "--light", "1,2,nan"}).exit, 2);
+  EXPECT_EQ(run_kiln({"eval", scene, "--points", points, "--light", "1,2,3,-1,0,0"}).exit, 2);
+  EXPECT_EQ(run_kiln({"eval", scene, "--points", points, "--indirect"}).exit, 2);
+}
+
 }  // namespace
 }  // namespace kiln

@@ -279,9 +279,9 @@ TEST(GatherRows, KnowFromWhichSideLightComes) {
   const GatherFaces faces(scene);
   const HitAlbedo albedo(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 8000}, threads);
-  const Senders senders(scene, h, false, threads);
+  const Senders senders(scene, h, PointPlacement{}, threads);
   const DirectLight dark(tracer, nullptr, {});
-  const SenderPaths paths({tracer, faces, albedo, senders, dark});
+  const SenderPaths paths({tracer, faces, albedo, senders, &dark});
   GatherRows rows(paths, 4096, 3);
   const TransferPoint middle{{0, 0, 0}, {0, 1, 0}, {0, 0, 0}, {0, 1, 0}};
   std::uint64_t rays = 0;
@@ -305,7 +305,7 @@ TEST(Senders, AnswerWithTheNearestPointToWithinACell) {
   const Tracer tracer(scene, threads);
   const GatherFaces faces(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 3000}, threads);
-  const Senders senders(scene, h, false, threads);
+  const Senders senders(scene, h, PointPlacement{}, threads);
   int answered = 0;
   for (std::uint32_t i = 0; i < 3000; ++i) {
     Random random(21, i);

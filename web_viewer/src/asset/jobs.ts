@@ -174,6 +174,18 @@ export interface Report {
     seen?: { relrmse: number; interval?: [number, number] }; // at the points that can be seen, when some cannot
     job_light?: { relrmse: number; interval?: [number, number] }; // its own light in full detail, lamps and all
   };
+  links?: {
+    senders: number;
+    receivers: number;
+    links: number;
+    share_of_possible: number;
+    bytes: number;
+    certificate: {
+      relrmse: number;
+      interval?: [number, number];
+      lamps: { place: [number, number, number]; relrmse: number; mean_light: number }[];
+    } | null;
+  };
   grid?: {
     size: [number, number, number];
     blend: string;

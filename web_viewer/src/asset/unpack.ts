@@ -5,6 +5,7 @@
 
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
+import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
 import {
   arrivingTransfers,
   componentRows,
@@ -18,6 +19,7 @@ export interface BakedPrimitive {
   stored: Float32Array[]; // its `_PRT_k`, four numbers of each vertex
   weights: Float32Array[]; // its `_GLOSSY_k` alike; none: it has no matrices
   positions: Float32Array;
+  normals: Float32Array;
   indices: Uint32Array;
 }
 
@@ -26,6 +28,7 @@ export interface Unpacked {
   transfer: StoredTransfer;
   arriving: StoredTransfer[]; // of the matrices, if there are any
   baked: BakedPrimitive[]; // in the order of the file
+  links: LightLinks | null; // for lamps that move
 }
 
 interface Json {
@@ -36,6 +39,7 @@ interface Json {
   images?: { bufferView?: number }[];
   extensionsUsed?: string[];
   extensionsRequired?: string[];
+  extensions?: Record<string, unknown>;
 }
 
 interface Primitive {
@@ -93,6 +97,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   const arriving = glossy ? arrivingTransfers(glossy, bytesIn(glossy.components.bufferView).slice().buffer) : [];
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
+  const links = takeLinks(json, bytesIn);
   const out = new Binary();
   moveImages(json, binary, out);
   for (const moved of [components, glossy?.components, glossy?.lobes])
@@ -119,7 +124,19 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     transfer,
     arriving,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
+    links,
   };
+}
+
+const kLinks = 'KILN_meshless_light';
+
+/// The links stay out of the GLB: its buffer views are others.
+function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLinks | null {
+  const extension = json.extensions?.[kLinks] as LinksExtension | undefined;
+  if (!extension) return null;
+  delete json.extensions![kLinks];
+  json.extensionsUsed = json.extensionsUsed?.filter((name) => name !== kLinks);
+  return readLinks(extension, bytesIn);
 }
 
 const isBaked = ({ extensions }: Primitive): boolean => extensions?.KILN_radiance_transfer !== undefined;
@@ -197,7 +214,8 @@ function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTra
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
   for (const name of [...names, ...matrices, 'COLOR_0']) delete primitive.attributes[name];
-  return { stored, weights, positions: floatsOf('POSITION', 3), indices: mesh.indices() };
+  const [positions, normals] = [floatsOf('POSITION', 3), floatsOf('NORMAL', 3)];
+  return { stored, weights, positions, normals, indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

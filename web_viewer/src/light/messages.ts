@@ -2,6 +2,7 @@
 // begins: its first message is a reply to no request.
 
 import type { EquirectMap } from './equirect';
+import type { PointLamp } from './links';
 
 /// Unpacks a scene.glb, keeps its transfer vectors and hands over the rest.
 export interface OpenRequest {
@@ -14,6 +15,15 @@ export interface RelightRequest {
   light: Float32Array;
   lamps: boolean;
   reuse: Float32Array[]; // arrays to write to, one per part; or none
+}
+
+/// What a lamp reflects to every vertex, by links.
+export interface LampRequest {
+  kind: 'lamp';
+  lamp: PointLamp; // unit cube
+  seen: Uint8Array; // a byte for each sample
+  baked: boolean; // the light of the bake is added
+  reuse: Float32Array[];
 }
 
 /// How bright the model is under a light: the 90th percentile over the vertices of the brightest channel.
@@ -42,7 +52,7 @@ export interface ProjectRequest {
 }
 
 export type Request =
-  OpenRequest | RelightRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
+  OpenRequest | RelightRequest | LampRequest | LevelRequest | MeasureRequest | CoefficientRequest | ProjectRequest;
 
 export interface ValuesReply {
   values: Float32Array[]; // one per part
@@ -58,7 +68,8 @@ export interface ProjectReply {
 
 export type Reply = { serial: number } & (
   | { begun: true }
-  | { opened: ArrayBuffer } // a GLB without compression and without transfer vectors
+  | { opened: ArrayBuffer; samples: Float32Array | null } // a GLB without compression and without transfer vectors; of links
+  // the senders' samples: place and normal of each, six numbers
   | { values: ValuesReply }
   | { projected: ProjectReply }
   | { failure: string }

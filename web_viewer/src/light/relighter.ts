@@ -1,5 +1,6 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
+import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
 
 type Answer = { resolve(reply: Reply): void; reject(error: Error): void };
@@ -12,6 +13,8 @@ export class Relighter {
   /// The worker runs by itself from then on; until then it needs this thread.
   readonly begun: Promise<void>;
   private begin: () => void = () => {};
+  /// Of the open file: where lamps that move must be seen from, place and normal (unit cube); null: it has no links.
+  samples: Float32Array | null = null;
 
   constructor() {
     this.begun = new Promise((resolve) => (this.begin = resolve));
@@ -24,14 +27,21 @@ export class Relighter {
   /// Takes the bytes of a scene.glb, and resolves with a GLB without its compression and transfer vectors. Everything below is
   /// about that file then.
   async open(file: ArrayBuffer): Promise<ArrayBuffer> {
+    this.samples = null;
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
+    this.samples = reply.samples;
     return reply.opened;
   }
 
   /// Light at every vertex of every part. `reuse`: arrays of an earlier reply that are no longer needed.
   relight(light: Float32Array, lamps: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
     return this.values({ kind: 'relight', light, lamps, reuse }, buffersOf(reuse));
+  }
+
+  /// What a lamp reflects to every vertex of every part. `seen`: a byte for each of the samples; is given away.
+  lamp(lamp: PointLamp, seen: Uint8Array<ArrayBuffer>, baked: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
+    return this.values({ kind: 'lamp', lamp, seen, baked, reuse }, [seen.buffer, ...buffersOf(reuse)]);
   }
 
   async level(light: Float32Array): Promise<number> {

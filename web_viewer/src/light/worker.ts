@@ -3,8 +3,10 @@
 import { loadDraco } from '../asset/draco_module';
 import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
+import { gatherRows, type LightLinks, lightSenders, readVertices, solveNodes } from './links';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type {
+  LampRequest,
   OpenRequest,
   ProjectReply,
   ProjectRequest,
@@ -24,12 +26,39 @@ decoder.catch(() => undefined); // is awaited by open()
 let transfer: StoredTransfer; // of the open file
 let arriving: StoredTransfer[] = []; // of its matrices
 let parts: BakedPrimitive[] = [];
+let links: LightLinks | null = null;
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
 async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
   const unpacked = unpack(await decoder, readPacked(file));
   [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
+  links = unpacked.links;
   return unpacked.file;
+}
+
+/// Place and unit normal of each sample of the senders.
+function samplesOf({ samples, sampleNormals }: LightLinks): Float32Array<ArrayBuffer> {
+  const out = new Float32Array(1.5 * samples.length);
+  for (let k = 0; k < samples.length / 4; ++k) {
+    const n = [0, 1, 2].map((c) => sampleNormals[16 * k + 12 + c]);
+    const size = Math.hypot(...n) || 1;
+    for (let c = 0; c < 3; ++c) [out[6 * k + c], out[6 * k + 3 + c]] = [samples[4 * k + c], n[c] / size];
+  }
+  return out;
+}
+
+function lampLight({ lamp, seen, baked, reuse }: LampRequest): Float32Array[] {
+  if (!links) throw new Error('this file has no links for lamps that move');
+  const own = baked ? relight(new Float32Array(0), true, []) : [];
+  const rows = gatherRows(links, solveNodes(links, lightSenders(links, lamp, seen)));
+  let first = 0;
+  return parts.map(({ normals }, i) => {
+    const to = reuse[i]?.length === normals.length ? reuse[i] : new Float32Array(normals.length);
+    readVertices(links!, rows, normals, { first, to });
+    first += normals.length / 3;
+    if (baked) for (let k = 0; k < to.length; ++k) to[k] += own[i][k];
+    return to;
+  });
 }
 
 const relight = (light: Float32Array, lamps: boolean, reuse: Float32Array[]): Float32Array[] =>
@@ -93,6 +122,8 @@ function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): Value
   switch (request.kind) {
     case 'relight':
       return relit(request);
+    case 'lamp':
+      return timed(() => lampLight(request), false);
     case 'level':
       return { values: [], arriving: [], range: level(request.light), milliseconds: 0 };
     case 'measure':
@@ -111,7 +142,8 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
   try {
     if (data.kind === 'open') {
       const opened = await open(data);
-      send({ serial, opened }, [opened]);
+      const samples = links && samplesOf(links);
+      send({ serial, opened, samples }, samples ? [opened, samples.buffer] : [opened]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);

@@ -98,6 +98,10 @@ export class GridView {
     return [inside.x, inside.y, inside.z];
   }
 
+  moveTo(place: Vector3): void {
+    this.viewer.state.set({ ballAt: this.ballAt(place) });
+  }
+
   private add(lines: LineSegments): Shown {
     this.viewer.stage.scene.add(lines);
     return {

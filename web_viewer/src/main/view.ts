@@ -91,7 +91,9 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     () => divider.dispose(),
     () => probe.dispose(),
   );
-  void openGrid(page, viewer, job).then(() => (document.documentElement.dataset.ready = 'true'));
+  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report)]).then(
+    () => (document.documentElement.dataset.ready = 'true'),
+  );
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
 }
 
@@ -103,7 +105,7 @@ async function openGrid(page: Page, viewer: Viewer, job: Job): Promise<void> {
       download(artifactUrl(job, 'grid.exr'), () => {}),
       import('../asset/grid_file'),
       import('./grid_view'),
-      import('./grid_drag'),
+      import('./ball_drag'),
     ]);
     const grid = readGrid(file);
     const view = new GridView(viewer, grid);
@@ -112,6 +114,26 @@ async function openGrid(page: Page, viewer: Viewer, job: Job): Promise<void> {
   } catch (error) {
     toast(`grid.exr cannot be shown: ${(error as Error).message}`, 'error');
   }
+}
+
+/// A lamp that moves, where the file has links for it.
+async function openLamp(page: Page, viewer: Viewer, report: Report | null): Promise<void> {
+  if (!viewer.lampSamples) return;
+  try {
+    const [{ LampView }, { dragBall }] = await Promise.all([import('./lamp_view'), import('./ball_drag')]);
+    const view = new LampView(viewer, viewer.lampSamples, brightestPlace(report));
+    page.onDispose(dragBall(viewer, view), () => view.dispose());
+    Object.assign(window, { kilnLamp: view });
+    await view.settled();
+  } catch (error) {
+    toast(`The lamp cannot be shown: ${(error as Error).message}`, 'error');
+  }
+}
+
+/// Of the places where the certificate hung lamps.
+function brightestPlace(report: Report | null): [number, number, number] | null {
+  const lamps = report?.links?.certificate?.lamps ?? [];
+  return lamps.reduce<(typeof lamps)[number] | null>((a, b) => (a && a.mean_light >= b.mean_light ? a : b), null)?.place ?? null;
 }
 
 export function toolbar(viewer: Pick<Viewer, 'stage' | 'state'>, job: Job, actions: KeyActions): HTMLElement {

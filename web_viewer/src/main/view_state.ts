@@ -23,6 +23,11 @@ export interface ViewState {
   ballAt: readonly [number, number, number] | null; // from the middle of the grid, in its half extents
   cells: boolean;
   arrows: boolean;
+  lamp: boolean; // that moves: see lamp_view.ts
+  lampAt: readonly [number, number, number] | null; // from the middle of the model, in its half extents
+  lampPower: number; // stops
+  lampBaked: boolean; // the light of the bake is added
+  lampIndirect: boolean; // reflected light alone
   compare: number | null; // where the divider stands, 0 to 1; null: off
   pose: CameraPose | null; // null: the default view
 }
@@ -43,6 +48,11 @@ export const kDefaultState: ViewState = {
   ballAt: null,
   cells: false,
   arrows: false,
+  lamp: true,
+  lampAt: null,
+  lampPower: 0,
+  lampBaked: false,
+  lampIndirect: false,
   compare: null,
   pose: null,
 };
@@ -64,6 +74,10 @@ export function encodeState(state: ViewState): string {
 }
 
 const inside = (at: number[]): boolean => at.length === 3 && at.every((x) => Math.abs(x) <= 1);
+const placeIn = (text: string | null): readonly [number, number, number] | null => {
+  const at = (text ?? '').split(',').map(Number);
+  return inside(at) ? (at as unknown as readonly [number, number, number]) : null;
+};
 
 /// Reads what encodeState wrote. Whatever it does not understand keeps its default: an address is anyone's text.
 export function decodeState(text: string, lights: readonly string[]): ViewState {
@@ -76,7 +90,6 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     allowed.includes(from.get(key) as T) ? (from.get(key) as T) : (kDefaultState[key] as T);
   const flag = (key: keyof ViewState): boolean =>
     from.has(key) ? from.get(key) === 'true' : (kDefaultState[key] as boolean);
-  const ballAt = (from.get('ballAt') ?? '').split(',').map(Number);
   const pose = (from.get('pose') ?? '').split(',').map(Number);
   return {
     light: one('light', lights),
@@ -91,9 +104,14 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
     ball: flag('ball'),
-    ballAt: inside(ballAt) ? (ballAt as unknown as ViewState['ballAt']) : null,
+    ballAt: placeIn(from.get('ballAt')),
     cells: flag('cells'),
     arrows: flag('arrows'),
+    lamp: flag('lamp'),
+    lampAt: placeIn(from.get('lampAt')),
+    lampPower: number('lampPower', -6, 6),
+    lampBaked: flag('lampBaked'),
+    lampIndirect: flag('lampIndirect'),
     compare: from.has('compare') ? number('compare', 0, 1) : null,
     pose: pose.length === 6 && pose.every(Number.isFinite) ? (pose as unknown as CameraPose) : null,
   };

@@ -1,6 +1,7 @@
 // The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
 
 import type { LoadedAsset } from '../asset/parse_gltf';
+import type { ValuesReply } from '../light/messages';
 import type { Relighter } from '../light/relighter';
 import { unshadowedLevel } from '../light/unshadowed';
 import { SkyBackground } from '../shaders/sky_background';
@@ -29,6 +30,8 @@ export class Viewer {
   onFailure: (message: string) => void = () => {};
   /// Called when the list of lights has grown.
   onLights: () => void = () => {};
+  /// In place of the relighter's own question, while a lamp that moves is shown (lamp_view.ts).
+  askLight: ((spare: Float32Array[]) => Promise<ValuesReply>) | null = null;
   private readonly background = new SkyBackground();
   private readonly unsubscribe: () => void;
   /// What the worker needed for the light that is shown.
@@ -48,7 +51,7 @@ export class Viewer {
     readonly asset: LoadedAsset,
     readonly model: BakedModel,
     readonly state: Store<ViewState>,
-    private readonly relighter: Relighter,
+    readonly relighter: Relighter,
     private readonly pictures: SkyPictures,
   ) {
     stage.scene.add(model.root, this.background.mesh);
@@ -110,12 +113,17 @@ export class Viewer {
     return this.model.transfer.fixed;
   }
 
+  /// Of a file with links: where lamps that move must be seen from.
+  get lampSamples(): Float32Array | null {
+    return this.relighter.samples;
+  }
+
   get lights(): Lights {
     return this.pictures.lights;
   }
 
   /// At most one request is under way; while it is, only the newest light waits.
-  private async relight(): Promise<void> {
+  async relight(): Promise<void> {
     this.relightAgain = this.relighting;
     if (this.relighting) return;
     this.relighting = true;
@@ -163,7 +171,9 @@ export class Viewer {
 
   private async relightOnce(): Promise<void> {
     const { light, rotation, intensity, lamps } = this.state.get();
-    const reply = await this.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, this.spare);
+    const reply = this.askLight
+      ? await this.askLight(this.spare)
+      : await this.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, this.spare);
     this.spare = this.model.setLight(reply.values);
     this.model.setArriving(reply.arriving);
     this.relitMilliseconds = reply.milliseconds;

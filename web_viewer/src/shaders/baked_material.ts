@@ -2,16 +2,23 @@
 // Where a part has matrices (mirror.ts):
 //   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission
 //   F0 = mix(0.04, albedo, metallic)
+// With a lamp that moves (LAMP: lamp_view.ts) its direct light is added to the value at each pixel:
+//   lampIntensity cos / (pi d^2), a share of shadow taps free
 //
 // `value` (attribute `light`, linear RGB) was computed by the light worker; nothing here depends on the number of coefficients.
 // Exposure and tone mapping are three's (renderer.toneMapping): the same for baked and original materials.
 
 import { Color, type Material, Matrix3, type MeshBasicMaterial, ShaderMaterial, type Texture } from 'three';
+import { lampFunctions } from './lamp_shadow';
 import { lobeFunctions, lobeTexels, mirrorFunctions } from './mirror';
 
 // What goes from one shader to the other. Light is taken inside the triangle: thin ones extrapolate it to any darkness.
 const varyings = /* glsl */ `
 centroid varying vec3 vLight;
+#ifdef LAMP
+varying vec3 vLampPlace;
+varying vec3 vLampNormal;
+#endif
 #ifdef VERTEX_ALBEDO
 varying vec4 vAlbedo;
 #endif
@@ -59,6 +66,10 @@ ${mirrorFunctions}
 
 void main() {
   vLight = light;
+#ifdef LAMP
+  vLampPlace = (modelMatrix * vec4(position, 1.0)).xyz;
+  vLampNormal = mat3(modelMatrix) * normal;
+#endif
 #ifdef MIRROR
   float rough = roughness;
 #ifdef FINISH_MAP
@@ -114,6 +125,23 @@ vec3 reflected(vec3 base, vec3 value) {
 #else
 vec3 reflected(vec3 base, vec3 value) { return base * value; }
 #endif
+#ifdef LAMP
+uniform vec3 lampIntensity;
+uniform float lampDirect;
+uniform float lampGlow;
+${lampFunctions}
+vec3 lampLight() {
+  vec3 way = lampPlace - vLampPlace;
+  vec3 n = normalize(vLampNormal);
+  float far2 = dot(way, way);
+  float facing = dot(way, n);
+  if (facing <= 0.0 || lampDirect == 0.0) return vec3(0.0);
+  float seen = 0.0;
+  for (int i = -1; i <= 1; ++i)
+    for (int j = -1; j <= 1; ++j) seen += lampSeenAt(vLampPlace, n, vec2(float(i), float(j)));
+  return lampIntensity * (lampDirect * seen / 9.0 * facing / (3.14159265 * far2 * sqrt(far2)));
+}
+#endif
 #include <common>
 #include <dithering_pars_fragment>
 
@@ -133,6 +161,10 @@ void main() {
 #endif
   // Spherical harmonics ring: a point in deep shadow may come out a little below zero.
   vec3 value = max(vLight, vec3(0.0));
+#ifdef LAMP
+  value += lampLight();
+  emitted *= lampGlow;
+#endif
   gl_FragColor = vec4(white ? value : reflected(base.rgb, value) + emitted, base.a);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>

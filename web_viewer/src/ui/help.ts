@@ -7,6 +7,7 @@ const kHelp: readonly [string, string][] = [
   ['Right drag · Shift + arrow keys', 'pan'],
   ['Click', 'the number at that point'],
   ['Drag the ball', 'through the light of a grid'],
+  ['Drag the lamp · I J K L U O', 'move the light of a file with links'],
   ['Wheel · pinch · Page Up, Page Down', 'zoom'],
   ['Shift + drag · [ and ]', 'turn the light'],
   ['+ and −', 'exposure'],

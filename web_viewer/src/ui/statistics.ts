@@ -24,6 +24,7 @@ export function statistics(viewer: Counted, report: Report | null): HTMLElement 
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
   if (report.reduce) box.append(h('h3', {}, 'Reduction'), pairs(reduction(report.reduce, report)));
   if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
+  if (report.links) box.append(h('h3', {}, 'Links'), pairs(links(report.links)));
   if (report.glossy?.radiance) box.append(h('h3', {}, 'Specular parts'), pairs(specular(report.glossy)));
   if (report.warnings?.length)
     box.append(h('h3', {}, `Warnings (${report.warnings.length})`), warnings(report.warnings));
@@ -115,6 +116,15 @@ function grid(of: NonNullable<Report['grid']>): Row[] {
     ['Rays per vertex', count(rays)],
     ...(c ? [['Relative error', withInterval(c)] as const] : []),
     ['from noise, lattice, storage', ['noise', 'lattice', 'storage'].map(from).join(', ')],
+  ];
+}
+
+function links({ senders, receivers, links: kept, share_of_possible: share, bytes: file, certificate: c }: NonNullable<Report['links']>): Row[] {
+  return [
+    ['Senders, receivers', `${count(senders)}, ${count(receivers)}`],
+    ['Links', `${count(kept)}, ${percent(share)} of possible`],
+    ['In the file', bytes(file)],
+    ...(c ? [['Relative error of reflected light', withInterval(c)] as const] : []),
   ];
 }
 

@@ -14,6 +14,7 @@ export interface Shown {
   readonly state: Store<ViewState>;
   readonly lights: Lights;
   readonly lamps: boolean; // the scene has some
+  readonly lampSamples?: Float32Array | null; // the file has links for lamps that move
   readonly asset: { hasOriginal: boolean };
   readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
   onLights: () => void;
@@ -46,7 +47,9 @@ export class ViewPanel {
   private light(): HTMLElement[] {
     const { controls, viewer } = this;
     if (viewer.lights.order === 0)
-      return [h('p', {}, `${viewer.lights.choices[0].label}. Radiosity is the light of the bake and cannot be changed.`)];
+      return viewer.lampSamples
+        ? this.lamp()
+        : [h('p', {}, `${viewer.lights.choices[0].label}. Radiosity is the light of the bake and cannot be changed.`)];
     const picker = controls.select('light', 'Environment', () => viewer.lights.choices);
     viewer.onLights = picker.refill;
     const file = h('input', { type: 'file', id: 'environment-file', accept: '.hdr,.exr' });
@@ -59,6 +62,16 @@ export class ViewPanel {
     ];
     if (viewer.lamps) out.push(controls.checkbox('lamps', 'Lamps of the scene'));
     return out;
+  }
+
+  private lamp(): HTMLElement[] {
+    const { controls } = this;
+    return [
+      controls.checkbox('lamp', 'A lamp that moves (drag it; I J K L U O)'),
+      controls.slider('lampPower', 'Power', { min: -6, max: 6, step: 0.1, show: (v) => `${v > 0 ? '+' : ''}${v.toFixed(1)} stops` }),
+      controls.checkbox('lampIndirect', 'Reflected light alone'),
+      controls.checkbox('lampBaked', 'The light of the bake too'),
+    ];
   }
 
   async useFile(file: File): Promise<void> {

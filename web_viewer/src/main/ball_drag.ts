@@ -1,11 +1,16 @@
-// The ball is dragged in the plane through its middle that faces the camera. The camera's own gestures rest meanwhile.
+// A ball is dragged in the plane through its middle that faces the camera. The camera's own gestures rest meanwhile.
 
-import { Plane, Raycaster, Vector2, Vector3 } from 'three';
-import type { GridView } from './grid_view';
+import { type Mesh, Plane, Raycaster, Vector2, Vector3 } from 'three';
 import type { Viewer } from './viewer';
 
+/// What is dragged: nothing while `ball` is null.
+export interface Dragged {
+  readonly ball: Mesh | null;
+  moveTo(place: Vector3): void;
+}
+
 /// Returns what ends it.
-export function dragBall(viewer: Viewer, view: GridView): () => void {
+export function dragBall(viewer: Viewer, view: Dragged): () => void {
   const { canvas, camera, controls } = viewer.stage;
   const ray = new Raycaster();
   const plane = new Plane();
@@ -33,7 +38,7 @@ export function dragBall(viewer: Viewer, view: GridView): () => void {
     if (event.pointerId !== pointer) return;
     aim(event);
     const place = ray.ray.intersectPlane(plane, new Vector3());
-    if (place) viewer.state.set({ ballAt: view.ballAt(place.add(grip)) });
+    if (place) view.moveTo(place.add(grip));
   };
   const up = (event: PointerEvent): void => {
     if (event.pointerId !== pointer) return;

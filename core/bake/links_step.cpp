@@ -1,0 +1,151 @@
+#include "core/bake/links_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/artifact/links_glb.h"
+#include "core/bake/radiosity_step.h"
+#include "core/mesh/topology.h"
+
+namespace kiln {
+namespace {
+
+/// What the qualities spend. Measured by kiln_transport: README.md of core/meshless.
+struct LinksEffort {
+  const char* reason;
+  int rays;
+  float eps;
+  LinkOracle oracle;
+  double points;               // times the automatic number
+  std::uint32_t most_senders;  // where the recipe gives no level
+};
+
+LinksEffort links_effort(Quality quality) {
+  switch (quality) {
+    case Quality::draft:
+      return {"the draft quality", 256, 0.05F, {.split = 0.01F, .largest = 0.08F}, 0.5, 6000};
+    case Quality::standard:
+      return {"the standard quality", 1024, 0.02F, {}, 1, kAutoSenders};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 4096, 0.01F, {.split = 0.0015F, .largest = 0.02F}, 2, 40000};
+}
+
+void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
+  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
+}
+
+std::string short_text(double x) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%.3g", x);
+  return out;
+}
+
+/// Area with the backs of double-sided faces, on which senders stand too.
+double sending_area(const Scene& scene) {
+  double sum = 0;
+  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) {
+    const Material& m = scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[t]].material)];
+    sum += (m.double_sided ? 2 : 1) * triangle_area(scene.mesh, scene.mesh.triangles[t]);
+  }
+  return sum;
+}
+
+/// Adds the links to a prediction, by points. Seconds a ray, links a row and bytes as measured by kiln_transport.
+void add_prediction(Plan& plan, const Scene& scene) {
+  constexpr double kSecondsARay = 0.25e-6, kLinksARow = 70, kBytesATerm = 5, kTerms = 10;
+  const LinkParams& l = *plan.links;
+  const double finest = std::ldexp(double{l.points.radius}, 1 - l.points.levels);
+  const double points = expected_points(sending_area(scene), finest), rays = points * l.rays;
+  const double senders = std::min(points, double(l.most_senders));
+  Prediction& out = plan.prediction;
+  const auto whole = [](double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); };
+  out.rays += whole(2 * rays);
+  out.seconds += 2 * kSecondsARay * rays + 2e-4 * points;
+  const double bytes =
+      points * (24 + 8 * kLinksARow) + senders * 16 * 10 + kBytesATerm * kTerms * static_cast<double>(out.vertices);
+  out.artifact_bytes += whole(bytes);
+  out.memory_bytes += whole(3 * bytes + 12.0 * l.rays * (senders + 4096) + 600 * points);
+}
+
+}  // namespace
+
+Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
+  const TransportStep& step = *recipe.transport;
+  Plan plan = make_radiosity_plan(scene, step.surface, recipe.quality, sky, threads);
+  const LinksEffort effort = links_effort(recipe.quality);
+  LinkParams& l = plan.links.emplace();
+  l.rays = step.surface.rays.value_or(effort.rays);
+  l.eps = static_cast<float>(step.surface.eps_irradiance.value_or(effort.eps));
+  l.oracle = effort.oracle;
+  l.bounces = step.surface.bounces.value_or(-1);
+  l.sender_level = step.sender_level.value_or(-1);
+  l.most_senders = effort.most_senders;
+  if (step.surface.radius || step.surface.levels) {
+    l.points = plan.radiosity->points;
+  } else {
+    l.points.wanted = static_cast<std::uint64_t>(effort.points * static_cast<double>(resolve({}, scene).wanted));
+    l.points = resolve(l.points, scene);
+  }
+  const std::string asked = "asked for by the recipe";
+  const double finest = std::ldexp(double{l.points.radius}, 1 - l.points.levels);
+  decide(plan, "links", "about " + short_text(expected_points(sending_area(scene), finest)) + " points",
+         "reflected light of lights that move, from senders to receivers; backs of double-sided faces send too");
+  decide(plan, "sender_level", l.sender_level < 0 ? "auto" : std::to_string(l.sender_level),
+         l.sender_level < 0 ? "the finest with at most " + std::to_string(l.most_senders) + " points" : asked);
+  decide(plan, "link rays", std::to_string(l.rays), step.surface.rays ? asked : effort.reason);
+  decide(plan, "link oracle", short_text(double{l.oracle.split}) + ", " + short_text(double{l.oracle.largest}),
+         effort.reason + std::string(": variation and size, of a receiver's light, above which a link is split"));
+  add_prediction(plan, scene);
+  return plan;
+}
+
+LinksStep::LinksStep(const Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads)
+    : plan_(plan),
+      log_(log),
+      scene_(scene),
+      tracer_(scene_, threads),
+      builder_(
+          tracer_,
+          [&] {
+            LinkParams params = *plan.links;
+            params.seed = params.points.seed = seed;
+            return params;
+          }(),
+          threads) {
+  log_.count_rays(builder_.stats().rays);
+}
+
+std::size_t LinksStep::columns() const { return builder_.probes(); }
+
+std::vector<float> LinksStep::values(std::span<const TransferPoint> points, Threads& threads) const {
+  return builder_.probe_light(points, threads);
+}
+
+Result<LinksOutcome> LinksStep::finish(Bytes& glb, const BakedScene& decoded, const Recipe& recipe, Threads& threads) {
+  const LightLinks made = builder_.finish(decoded.scene.mesh, threads);
+  const std::size_t before = glb.size();
+  KILN_TRY(with, add_links(glb, made));
+  glb = std::move(with);
+  KILN_TRY(read, read_links(glb, decoded));
+  LinksOutcome out{
+      .links = std::move(read), .stats = builder_.stats(), .bytes = glb.size() - before, .certificate = {}};
+  const LinkStats& stats = out.stats;
+  decide(plan_, "senders", std::to_string(stats.senders) + " of level " + std::to_string(stats.sender_level),
+         std::to_string(out.links.sweeps) + " sweeps among them for all reflections but the last");
+  decide(plan_, "receivers", std::to_string(out.links.rows() - out.links.senders),
+         "finer points where coarser ones do not predict the light of probe lamps; " + std::to_string(stats.alone) +
+             " vertices gather for themselves");
+  decide(plan_, "links kept",
+         std::to_string(out.links.links.size()) + ", " + short_text(100 * out.links.share_of_possible()) + " %",
+         "of a link from each sender to each receiver");
+  if (recipe.certificate) {
+    out.certificate =
+        certify_links({decoded, out.links, tracer_, plan_.links->bounces, log_.rays(), false, recipe.seed}, threads);
+    log_.know_error(out.certificate->error.relrmse);
+  }
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,6 @@
+if(TARGET kiln_reference_set)
+  add_executable(kiln_transport transport.cpp)
+  kiln_flags(kiln_transport)
+  target_link_libraries(kiln_transport PRIVATE kiln_meshless kiln_reference_set)
+  target_compile_definitions(kiln_transport PRIVATE KILN_SHARED="${PROJECT_SOURCE_DIR}/../shared")
+endif()
