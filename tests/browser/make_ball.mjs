@@ -1,5 +1,5 @@
-// node make_ball.mjs OUT.ply [ACROSS]: a ball with bumps and coloured bands, 12 ACROSS^2 triangles (ACROSS 40 by default), for the
-// fixtures of reduced models:
+// node make_ball.mjs OUT.ply [ACROSS]: a ball with bumps and coloured bands, 12 ACROSS^2 triangles (ACROSS 40 by
+// default), for the fixtures of reduced models:
 //   kiln bake ball.ply -r recipe.json -o out      {"steps": [{"do": "reduce", "triangles": 1200, "normal_map": 256}]}
 
 import { writeFileSync } from 'node:fs';
