@@ -15,14 +15,6 @@ DirectTransfer rough(DirectTransfer sky) {
   return sky;
 }
 
-/// About a thousand vertices spread over the input, whatever batches will be asked for.
-std::vector<TransferPoint> spread_points(const Mesh& mesh) {
-  const std::vector<TransferPoint> all = vertex_points(mesh);
-  std::vector<TransferPoint> some;
-  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
-  return some;
-}
-
 /// Of the constant band at points.
 double mean_constant_band(const Tracer& tracer, const std::vector<TransferPoint>& points, std::uint64_t seed,
                           Threads& threads) {
@@ -34,6 +26,13 @@ double mean_constant_band(const Tracer& tracer, const std::vector<TransferPoint>
 }
 
 }  // namespace
+
+std::vector<TransferPoint> spread_points(const Mesh& mesh) {
+  const std::vector<TransferPoint> all = vertex_points(mesh);
+  std::vector<TransferPoint> some;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
+  return some;
+}
 
 DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
                         std::uint64_t seed, Threads& threads) {

@@ -24,6 +24,9 @@ namespace kiln {
 inline constexpr int kRoughRays = 4;                    // so many times fewer for points that only tell where to split
 inline constexpr float kOpenConstantBand = 0.2820948F;  // Y(0,0): t_0 of an unoccluded point
 
+/// About a thousand vertices spread over the mesh: a pilot for what all of them have.
+std::vector<TransferPoint> spread_points(const Mesh&);
+
 /// How the rays for distant light are spent: each point to the noise of the plan, relative to the mean light of about a
 /// thousand vertices. `band_power` as in lightings.h.
 DirectTransfer sky_rays(const Tracer&, const Plan&, const std::vector<double>& band_power, std::uint64_t seed,

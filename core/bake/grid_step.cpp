@@ -35,10 +35,6 @@ GridEffort grid_effort(const Recipe& recipe) {
   return {"the final quality", 64, 1024};
 }
 
-void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
-  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
-}
-
 std::string text_of(const std::array<int, 3>& size) {
   return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);
 }

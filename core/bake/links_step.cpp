@@ -32,16 +32,6 @@ LinksEffort links_effort(Quality quality) {
   return {"the final quality", 4096, 0.01F, {.split = 0.0015F, .largest = 0.02F}, 2, 40000};
 }
 
-void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
-  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
-}
-
-std::string short_text(double x) {
-  char out[32];
-  std::snprintf(out, sizeof out, "%.3g", x);
-  return out;
-}
-
 /// Area with the backs of double-sided faces, on which senders stand too.
 double sending_area(const Scene& scene) {
   double sum = 0;

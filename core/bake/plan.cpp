@@ -18,16 +18,6 @@ bool has_lamps(const Scene& scene) {
                      [&](const Part& part) { return emits(scene.materials[static_cast<std::size_t>(part.material)]); });
 }
 
-std::string text(double x) {
-  std::array<char, 32> out{};
-  std::snprintf(out.data(), out.size(), "%.3g", x);
-  return out.data();
-}
-
-void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
-  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
-}
-
 constexpr const char* kAsked = "asked for by the recipe";
 
 void plan_order(Plan& plan, const PrtStep& step, const Effort& effort) {
@@ -48,7 +38,7 @@ void plan_bounces(Plan& plan, const Tracer& tracer, const PrtStep& step, const E
   decide(plan, "bounces", std::to_string(plan.bounces),
          plan.bounces == 0 && tail.left == 0
              ? "no path finds light by reflection"
-             : "sample paths bring " + text(100 * tail.left) + " % of the light in later reflections");
+             : "sample paths bring " + short_text(100 * tail.left) + " % of the light in later reflections");
 }
 
 void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {
@@ -57,9 +47,9 @@ void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {
   plan.lamp_samples = step.samples ? std::max(16, *step.samples / 8) : effort.lamp_samples;
   plan.noise = step.samples ? 0 : effort.noise;
   decide(plan, "samples", std::to_string(plan.samples),
-         step.samples
-             ? kAsked
-             : effort.reason + "; a point stops before where " + text(100 * plan.noise) + " % of noise is reached");
+         step.samples ? kAsked
+                      : effort.reason + "; a point stops before where " + short_text(100 * plan.noise) +
+                            " % of noise is reached");
 }
 
 void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
@@ -70,7 +60,7 @@ void plan_encoding(Plan& plan, const PrtStep& step, const Effort& effort) {
   if (step.encoding.form != Form::automatic)
     return decide(plan, "encoding", step.encoding.form == Form::raw ? "raw" : "pca", kAsked);
   decide(plan, "encoding", "auto",
-         "components if they are smaller than raw coefficients; they may add " + text(100 * plan.compression) +
+         "components if they are smaller than raw coefficients; they may add " + short_text(100 * plan.compression) +
              " % of error");
 }
 
@@ -118,6 +108,16 @@ void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision
 }
 
 }  // namespace
+
+std::string short_text(double x) {
+  std::array<char, 32> out{};
+  std::snprintf(out.data(), out.size(), "%.3g", x);
+  return out.data();
+}
+
+void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
+  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
+}
 
 Effort effort_of(Quality quality) {
   switch (quality) {

@@ -50,6 +50,10 @@ struct Plan {
   Prediction prediction;
 };
 
+void decide(Plan&, std::string decision, std::string value, std::string reason);
+/// Three digits, for reasons.
+std::string short_text(double);
+
 /// What a bake spends where the recipe does not say.
 struct Effort {
   std::string reason;  // "the standard quality"

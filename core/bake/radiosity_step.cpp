@@ -66,23 +66,6 @@ double mean_of(const std::vector<Vec3f>& values) {
   return values.empty() ? 0 : sum / (3 * static_cast<double>(values.size()));
 }
 
-std::vector<TransferPoint> some_vertices(const Mesh& mesh) {
-  const std::vector<TransferPoint> all = vertex_points(mesh);
-  std::vector<TransferPoint> some;
-  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 1024) some.push_back(all[i]);
-  return some;
-}
-
-void decide(Plan& plan, std::string decision, std::string value, std::string reason) {
-  plan.decisions.push_back({std::move(decision), std::move(value), std::move(reason)});
-}
-
-std::string short_text(double x) {
-  char out[32];
-  std::snprintf(out, sizeof out, "%.3g", x);
-  return out;
-}
-
 bool has_lamps(const Scene& scene) {
   if (!scene.lights.empty()) return true;
   return std::any_of(scene.parts.begin(), scene.parts.end(), [&](const Part& part) {
@@ -205,7 +188,7 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
     std::uint64_t rays = 0, points = 0;
     const std::uint64_t expected =
         std::max<std::uint64_t>(1, plan.split ? 3 * plan.subdivide.triangles : scene.mesh.position.size());
-    const double mean = mean_of(light_at(some_vertices(scene.mesh), rough, params.seed, rays, threads));
+    const double mean = mean_of(light_at(spread_points(scene.mesh), rough, params.seed, rays, threads));
     const float scale = mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
     const auto columns = [&](std::span<const TransferPoint> batch, const DirectLight& from) {
       std::vector<float> out;

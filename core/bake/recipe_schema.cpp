@@ -13,6 +13,17 @@ std::string recipe_schema() {
   "definitions": {
     "sha256": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
     "auto": {"const": "auto"},
+    "gather_scheme": {"description": "rows: the transport operator is traced once and kept", "enum": ["rows"], "default": "rows"},
+    "gather_points": {
+      "type": "object", "additionalProperties": false,
+      "properties": {
+        "radius": {"description": "of the coarsest points, metres", "anyOf": [{"type": "number", "minimum": 1e-9, "maximum": 1e12}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "levels": {"description": "each halves the radius", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 12}, {"$ref": "#/definitions/auto"}], "default": "auto"}
+      }
+    },
+    "eps_irradiance": {"description": "prediction error that asks for finer points, of the mean light", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+    "gather_rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+    "gather_bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
     "subdivide": {
       "default": "auto",
       "anyOf": [{"enum": ["auto", "off"]}, {
@@ -51,17 +62,11 @@ std::string recipe_schema() {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "properties": {
         "do": {"enum": ["radiosity"]},
-        "scheme": {"description": "rows: the transport operator is traced once and kept", "enum": ["rows"], "default": "rows"},
-        "points": {
-          "type": "object", "additionalProperties": false,
-          "properties": {
-            "radius": {"description": "of the coarsest points, metres", "anyOf": [{"type": "number", "minimum": 1e-9, "maximum": 1e12}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-            "levels": {"description": "each halves the radius", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 12}, {"$ref": "#/definitions/auto"}], "default": "auto"}
-          }
-        },
-        "eps_irradiance": {"description": "prediction error that asks for finer points, of the mean light", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-        "rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-        "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "scheme": {"$ref": "#/definitions/gather_scheme"},
+        "points": {"$ref": "#/definitions/gather_points"},
+        "eps_irradiance": {"$ref": "#/definitions/eps_irradiance"},
+        "rays": {"$ref": "#/definitions/gather_rays"},
+        "bounces": {"$ref": "#/definitions/gather_bounces"},
         "subdivide": {"$ref": "#/definitions/subdivide"}
       }
     },
@@ -69,17 +74,11 @@ std::string recipe_schema() {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "properties": {
         "do": {"enum": ["transport"]},
-        "scheme": {"description": "rows: the transport operator is traced once and kept", "enum": ["rows"], "default": "rows"},
-        "points": {
-          "type": "object", "additionalProperties": false,
-          "properties": {
-            "radius": {"description": "of the coarsest points, metres", "anyOf": [{"type": "number", "minimum": 1e-9, "maximum": 1e12}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-            "levels": {"description": "each halves the radius", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 12}, {"$ref": "#/definitions/auto"}], "default": "auto"}
-          }
-        },
-        "eps_irradiance": {"description": "prediction error that asks for finer points, of the mean light", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-        "rays": {"description": "of a gather", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-        "bounces": {"description": "reflections between surfaces; auto: until a ten-thousandth of the light is left", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 1000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "scheme": {"$ref": "#/definitions/gather_scheme"},
+        "points": {"$ref": "#/definitions/gather_points"},
+        "eps_irradiance": {"$ref": "#/definitions/eps_irradiance"},
+        "rays": {"$ref": "#/definitions/gather_rays"},
+        "bounces": {"$ref": "#/definitions/gather_bounces"},
         "subdivide": {"$ref": "#/definitions/subdivide"},
         "sender_level": {"description": "the finest level of points that send, from 0; auto: the finest with at most 6000 (draft), 12000 or 40000 (final) points", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 11}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
