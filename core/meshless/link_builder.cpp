@@ -8,6 +8,7 @@
 #include "core/base/random.h"
 #include "core/meshless/basis.h"
 #include "core/meshless/free_places.h"
+#include "core/meshless/link_reading.h"
 #include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 
@@ -67,8 +68,8 @@ struct LinkBuilder::Work {
   std::vector<std::vector<Vec3f>> lamp;  // of each probe: light at the senders, all reflections
   std::vector<Vec3f> gathered;           // [row * probes + probe]: what one more reflection brings
   std::vector<float> limit;              // of each probe
-  std::optional<MeshlessBasis> reading_basis;
-  std::vector<std::uint32_t> reading_known;
+  std::vector<std::uint32_t> read_row;   // the gathered row of each receiver that is read
+  std::optional<LinkReading> reading;
   LightLinks links;
   LinkStats stats;
 
@@ -111,6 +112,14 @@ struct LinkBuilder::Work {
     for (std::size_t r = 0; r < receiver.size(); ++r) measure(*sender_rows, r);
     sender_rows.reset();
     refine(threads);
+    begin_reading(threads);
+  }
+
+  void begin_reading(Threads& threads) {
+    read_row = readable(all.levels());
+    std::vector<LinkReading::Receiver> receivers;
+    for (const std::uint32_t r : read_row) receivers.push_back({all.points[receiver[r]].site, link_row[r]});
+    reading.emplace(tracer, std::move(receivers), params.neighbours, threads);
   }
 
   /// Rows `first` and on of `from`, those of them that are `chosen`.
@@ -364,30 +373,20 @@ struct LinkBuilder::Work {
     return out;
   }
 
-  std::vector<float> probe_light(std::span<const TransferPoint> places, Threads& threads) {
+  std::vector<float> probe_light(std::span<const TransferPoint> places, Threads& threads) const {
     std::vector<float> out(places.size() * probes(), 0.0F);
     if (probes() == 0) return out;
-    if (!reading_basis) {
-      reading_known = readable(all.levels());
-      reading_basis.emplace(basis_of(reading_known, threads));
-    }
     threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      std::vector<BasisTerm> terms;
       for (std::size_t i = begin; i < end; ++i) {
-        terms.clear();
-        const TransferPoint& p = places[i];
-        if (reading_basis->terms({p.position, p.normal, 0}, 1, terms) != Cover::functions) continue;
-        float sum = 0;
+        const LinkReading::Seen near = reading->seen(places[i], 0);
         std::vector<float> light(probes());
-        for (const BasisTerm& t : terms) {
-          const std::uint32_t r = reading_known[t.function];
-          if (!in_sight(tracer, {ray_origin(p), p.normal, 0}, all.points[receiver[r]].site)) continue;
-          sum += t.value;
+        for (const BasisTerm& t : near.terms) {
+          const std::size_t first = read_row[t.function] * probes();
           for (std::size_t k = 0; k < probes(); ++k)
-            light[k] += t.value * static_cast<float>(mean_of(gathered[r * probes() + k]));
+            light[k] += t.value * static_cast<float>(mean_of(gathered[first + k]));
         }
-        for (std::size_t k = 0; k < probes() && sum > 0; ++k)
-          out[i * probes() + k] = limit[k] > 0 ? params.eps * light[k] / (sum * limit[k]) : 0;
+        for (std::size_t k = 0; k < probes() && near.sum > 0; ++k)
+          out[i * probes() + k] = limit[k] > 0 ? params.eps * light[k] / (near.sum * limit[k]) : 0;
       }
     });
     return out;
@@ -395,7 +394,7 @@ struct LinkBuilder::Work {
 
   // Step 5.
 
-  struct Reading {
+  struct VertexReading {
     std::vector<RowTerm> terms;  // none: it gathers for itself
     bool enclosed = false;
   };
@@ -410,26 +409,28 @@ struct LinkBuilder::Work {
     }
     const std::vector<bool> dark;
     for (const StandIn& s : find_stand_ins(mesh, dark, hidden_test(tracer), threads)) vertices[s.vertex] = s.point;
-    const std::vector<std::uint32_t> known = readable(all.levels());
-    const MeshlessBasis basis = basis_of(known, threads);
     const std::vector<std::uint32_t> group = groups_of(mesh);
-    std::vector<Reading> reading(vertices.size());
+    std::vector<VertexReading> of_vertex(vertices.size());
     threads.for_blocks(vertices.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) reading[v] = read(vertices[v], group[v], basis, known);
+      for (std::size_t v = begin; v < end; ++v) {
+        VertexReading& own = of_vertex[v];
+        own.enclosed = is_enclosed(tracer, faces, vertices[v], true);
+        if (!own.enclosed) own.terms = reading->rows(vertices[v], group[v]);
+      }
     });
     std::vector<TransferPoint> open, inside;
     std::vector<std::uint32_t> open_vertex, inside_vertex;
-    for (std::uint32_t v = 0; v < reading.size(); ++v) {
-      if (!reading[v].terms.empty()) continue;
-      (reading[v].enclosed ? inside : open).push_back(vertices[v]);
-      (reading[v].enclosed ? inside_vertex : open_vertex).push_back(v);
+    for (std::uint32_t v = 0; v < of_vertex.size(); ++v) {
+      if (!of_vertex[v].terms.empty()) continue;
+      (of_vertex[v].enclosed ? inside : open).push_back(vertices[v]);
+      (of_vertex[v].enclosed ? inside_vertex : open_vertex).push_back(v);
     }
     std::swap(links, out);
-    add_lone(open, open_vertex, false, reading, threads);
-    add_lone(inside, inside_vertex, true, reading, threads);
+    add_lone(open, open_vertex, false, of_vertex, threads);
+    add_lone(inside, inside_vertex, true, of_vertex, threads);
     std::swap(links, out);
     stats.alone = open.size() + inside.size();
-    for (const Reading& r : reading) {
+    for (const VertexReading& r : of_vertex) {
       out.terms.insert(out.terms.end(), r.terms.begin(), r.terms.end());
       out.term_begin.push_back(static_cast<std::uint32_t>(out.terms.size()));
     }
@@ -437,11 +438,11 @@ struct LinkBuilder::Work {
   }
 
   void add_lone(const std::vector<TransferPoint>& places, const std::vector<std::uint32_t>& vertex, bool enclosed,
-                std::vector<Reading>& reading, Threads& threads) {
+                std::vector<VertexReading>& of_vertex, Threads& threads) {
     const std::size_t first = lone_rows->size();
     lone_rows->add(places, enclosed, threads, stats.rays);
     for (std::size_t i = 0; i < places.size(); ++i) {
-      reading[vertex[i]].terms = {{static_cast<std::uint32_t>(links.rows() + i), 255}};
+      of_vertex[vertex[i]].terms = {{static_cast<std::uint32_t>(links.rows() + i), 255}};
       add_site({places[i].position, places[i].normal, 0}, RowSite::kLone);
     }
     std::vector<std::uint32_t> every(places.size());
@@ -456,48 +457,6 @@ struct LinkBuilder::Work {
       for (const std::uint32_t v : mesh.triangles[t]) group[v] = mesh.part[t];
     }
     return group;
-  }
-
-  Reading read(const TransferPoint& p, std::uint32_t group, const MeshlessBasis& basis,
-               const std::vector<std::uint32_t>& known) const {
-    Reading out;
-    out.enclosed = is_enclosed(tracer, faces, p, true);
-    if (out.enclosed) return out;
-    const SurfaceSite site{p.position, p.normal, group};
-    SurfaceSite raised = site;
-    raised.position = ray_origin(p);
-    std::vector<BasisTerm> terms;
-    if (basis.terms(site, 1, terms) != Cover::functions) return out;
-    std::vector<BasisTerm> seen;
-    float sum = 0;
-    for (const BasisTerm& t : terms) {
-      if (!in_sight(tracer, raised, all.points[receiver[known[t.function]]].site)) continue;
-      seen.push_back(t);
-      sum += t.value;
-    }
-    constexpr float kFewest = 0.05F;  // of the weight: what is left is no interpolation
-    if (!(sum > kFewest)) return out;
-    out.terms = rounded(seen, sum, known);
-    return out;
-  }
-
-  /// Weights in 255ths that sum to 255; the smallest are left out.
-  std::vector<RowTerm> rounded(std::vector<BasisTerm> terms, float sum, const std::vector<std::uint32_t>& known) const {
-    std::sort(terms.begin(), terms.end(), [](const BasisTerm& a, const BasisTerm& b) {
-      return a.value != b.value ? a.value > b.value : a.function < b.function;
-    });
-    std::vector<RowTerm> out;
-    float left = 0;
-    int given = 0;
-    for (const BasisTerm& t : terms) {
-      const float exact = 255 * t.value / sum + left;
-      const int whole = std::clamp(static_cast<int>(std::lrint(exact)), 0, 255 - given);
-      left = exact - static_cast<float>(whole);
-      given += whole;
-      if (whole > 0) out.push_back({link_row[known[t.function]], static_cast<std::uint8_t>(whole)});
-    }
-    if (!out.empty()) out.front().weight = static_cast<std::uint8_t>(out.front().weight + 255 - given);
-    return out;
   }
 };
 
