@@ -113,7 +113,8 @@ std::string promise_text(std::string_view report) {
                     " passes, " + human_seconds(number_of(document, "seconds")) + ")";
   if (!document.contains("error_sources")) return out;
   const json& sources = document["error_sources"];
-  out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + ", interpolation " +
+  out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + " (of reflections " +
+         percent_text(number_of(sources, "noise_of_reflections")) + "), interpolation " +
          percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
          percent_text(number_of(sources, "bounce_tail")) + ", quantisation " +
          percent_text(number_of(sources, "quantisation")) + ", compression " +

@@ -158,12 +158,12 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   }
   log.begin("write", 0.9);
   const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
-  const Probes noise = std::move(transport.noise);
+  const NoiseProbes noise = std::move(transport.noise);
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   if (baked.glossy)
     encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
-  const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.vertices);
+  const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.direct.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   scene = std::move(baked.scene);

@@ -30,7 +30,7 @@ json record_json(const PassRecord& p) {
           {"interval", {p.low, p.high}},
           {"own_relrmse", optional_json(p.own_relrmse)},
           {"own_high", optional_json(p.own_high)},
-          {"sources", {s.noise, s.bounce_tail, s.quantisation, s.compression, s.interpolation}},
+          {"sources", {s.noise, s.noise_of_reflections, s.bounce_tail, s.quantisation, s.compression, s.interpolation}},
           {"truncation", optional_json(s.truncation)}};
 }
 
@@ -51,10 +51,11 @@ PassRecord read_record(const json& value) {
           .own_relrmse = optional_number(value.at("own_relrmse")),
           .own_high = optional_number(value.at("own_high")),
           .sources = {.noise = s.at(0).get<double>(),
-                      .bounce_tail = s.at(1).get<double>(),
-                      .quantisation = s.at(2).get<double>(),
-                      .compression = s.at(3).get<double>(),
-                      .interpolation = s.at(4).get<double>(),
+                      .noise_of_reflections = s.at(1).get<double>(),
+                      .bounce_tail = s.at(2).get<double>(),
+                      .quantisation = s.at(3).get<double>(),
+                      .compression = s.at(4).get<double>(),
+                      .interpolation = s.at(5).get<double>(),
                       .truncation = optional_number(value.at("truncation"))}};
 }
 

@@ -72,15 +72,19 @@ double squared(const Judged& judged, const Probes& probes, std::size_t slots) {
 
 }  // namespace
 
-ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const Probes& noise,
+ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const NoiseProbes& noise,
                          const StorageProbes& storage, double tail_left) {
   const Judged judged(certificate, decoded);
   const auto slots = static_cast<std::size_t>(decoded.transfer.slots());
-  const double rays = kInterpolated * squared(judged, noise, slots) / 2;  // of one draw: half the difference's
+  const auto of_one_draw = [&](const Probes& twice) { return kInterpolated * squared(judged, twice, slots) / 2; };
+  const double direct = of_one_draw(noise.direct), reflected = of_one_draw(noise.reflected), rays = direct + reflected;
   const double steps = kInterpolated * squared(judged, storage.rounding, slots);
   const double rest = squared(judged, storage.left_out, slots);  // alike at a triangle's corners
-  ErrorSources out{
-      .noise = root(rays), .bounce_tail = tail_left, .quantisation = root(steps), .compression = root(rest)};
+  ErrorSources out{.noise = root(rays),
+                   .noise_of_reflections = root(reflected),
+                   .bounce_tail = tail_left,
+                   .quantisation = root(steps),
+                   .compression = root(rest)};
   out.interpolation = root(square(certificate.transport.relrmse) - rays - steps - rest - square(tail_left));
   if (certificate.job_light && !certificate.transport.by_lighting.empty()) {
     const auto own = std::ranges::find(certificate.lightings, decoded.light.name);

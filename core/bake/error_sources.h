@@ -1,13 +1,14 @@
 #pragma once
 // Where the error of a bake comes from, in the unit of its certificate: relRMSE under the lightings that were judged.
 //
-//   noise          of the rays, from two independent draws at a few hundred vertices; interpolation halves its variance
+//   noise          of the rays, from two independent draws at a few hundred vertices; interpolation halves its variance;
+//                  noise_of_reflections is the part of it that the rays between surfaces have
 //   bounce_tail    share of the light in reflections beyond the last, from the plan's sample paths
 //   quantisation   rounding of the stored numbers, compression   components that are not stored: what a reader finds at
 //                  the same vertices
 //   interpolation  what of the measured error the others leave: light that changes within triangles
 //   truncation     what the order cannot hold of the job's own light; beside the transport error, not part of it
-// The first five are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
+// The five are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
 
 #include <optional>
 
@@ -20,11 +21,11 @@
 namespace kiln {
 
 struct ErrorSources {
-  double noise = 0, bounce_tail = 0, quantisation = 0, compression = 0, interpolation = 0;
+  double noise = 0, noise_of_reflections = 0, bounce_tail = 0, quantisation = 0, compression = 0, interpolation = 0;
   std::optional<double> truncation;
 };
 
-ErrorSources split_error(const Certificate&, const BakedScene& decoded, const Probes& noise, const StorageProbes&,
-                         double tail_left);
+ErrorSources split_error(const Certificate&, const BakedScene& decoded, const NoiseProbes& noise,
+                         const StorageProbes&, double tail_left);
 
 }  // namespace kiln

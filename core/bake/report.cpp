@@ -238,6 +238,7 @@ ordered_json prediction_object(const Prediction& p) {
 
 ordered_json sources_object(const ErrorSources& s) {
   ordered_json out = {{"noise", s.noise},
+                      {"noise_of_reflections", s.noise_of_reflections},
                       {"interpolation", s.interpolation},
                       {"bounce_tail", s.bounce_tail},
                       {"quantisation", s.quantisation},

@@ -131,8 +131,8 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
   std::vector<float> sky;
   std::vector<Vec3f> lamps;
   std::vector<StandIn> stand_ins;
+  std::vector<std::uint32_t> probes;
   Transport out;
-  std::vector<float> direct_noise;
   log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
@@ -143,8 +143,8 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
     stand_ins = std::move(direct.stand_ins);
     log.count_rays(source.stats().rays);
     skip_bounces_of_open_scene(plan, source);
-    out.noise.vertices = choose_probes(direct.mesh);
-    direct_noise = draw_twice(tracer, points_at(direct.mesh, out.noise.vertices), plan, rays, threads);
+    probes = choose_probes(direct.mesh);
+    out.noise.direct = {probes, draw_twice(tracer, points_at(direct.mesh, probes), plan, rays, threads)};
     return std::move(direct.mesh);
   }();
   scene.mesh = std::move(refined);
@@ -160,9 +160,11 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
                             .samples = plan.bounce_samples,
                             .seed = seed,
                             .stand_ins = stand_ins,
-                            .probes = out.noise.vertices,
+                            .probes = probes,
                             .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
                            threads, &stats, &reflected);
+  if (plan.bounces > 0) out.noise.reflected = {std::move(probes), std::move(reflected.difference)};
+  out.bounce_rays = stats.rays;
   log.count_rays(stats.rays);
   if (plan.glossy) {
     log.begin("glossy", 0.88);
@@ -172,8 +174,6 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
     out.glossy = bake_matrices(tracer, out.transfer, plan, band_power, std::move(bake), threads);
     log.count_rays(out.glossy.rays);
   }
-  out.noise.difference = std::move(direct_noise);
-  for (std::size_t i = 0; i < reflected.difference.size(); ++i) out.noise.difference[i] += reflected.difference[i];
   return out;
 }
 

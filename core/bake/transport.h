@@ -21,9 +21,15 @@ struct Probes {
   std::vector<float> difference;  // [probe * 3 * slots + c * slots + i], always RGB
 };
 
+/// A second, independent draw of the same samples minus the first.
+struct NoiseProbes {
+  Probes direct, reflected;
+};
+
 struct Transport {
-  Transfer transfer;   // of scene.mesh's vertices
-  Probes noise;        // a second, independent draw of the same samples minus the first
+  Transfer transfer;  // of scene.mesh's vertices
+  NoiseProbes noise;
+  std::uint64_t bounce_rays = 0;
   GlossyBaked glossy;  // as planned
 };
 

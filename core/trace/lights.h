@@ -38,6 +38,8 @@ class EmitterSampler {
   explicit EmitterSampler(const Scene&);
 
   bool empty() const { return triangles_.empty(); }
+  /// Sum over the emitters of area times red, green and blue of the emission factor.
+  double total_strength() const { return total_; }
   /// `pick` and `u` are uniform in [0, 1). Not for an empty sampler.
   EmitterSample sample(double pick, const Vec2<double>& u) const;
   /// EmitterSample::density of points on a triangle of the scene; 0 where it does not emit.

@@ -13,7 +13,7 @@
 #include "core/sphere/sh.h"
 #include "core/trace/environment_sampler.h"
 #include "core/trace/ggx.h"
-#include "core/trace/lights.h"
+#include "core/trace/lamp_light.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -21,16 +21,6 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr int kSafeBounces = 2;  // Russian roulette spares the first vertices
-
-/// A point on a surface that light arrives at, seen from the side of its normals.
-struct Vertex {
-  Vec3d position, normal, face;
-};
-
-/// Where a vertex's rays start, clear of its face.
-Vec3f lifted(const Vertex& v) {
-  return offset_origin(to_float(v.position), to_float(dot(v.normal, v.face) < 0 ? -v.face : v.face));
-}
 
 Vec3d times(const Vec3d& a, const Vec3f& b) { return a * to_double(b); }
 double largest(const Vec3d& a) { return std::max({a.x, a.y, a.z}); }
@@ -59,16 +49,19 @@ class PathNumbers {
 class Estimator {
  public:
   Estimator(const Tracer& tracer, const ReferenceLight& light, const ReferenceOptions& options)
-      : tracer_(tracer), scene_(tracer.scene()), light_(light), options_(options), emitters_(tracer.scene()) {
+      : tracer_(tracer),
+        scene_(tracer.scene()),
+        light_(light),
+        options_(options),
+        lamps_(tracer, light.lamps, light.scene_lights) {
     for (const Environment& e : light.environments) samplers_.emplace_back(e);
   }
 
-  std::size_t lightings() const {
-    return light_.environments.size() + light_.sh.size() + light_.lamps.size() + (light_.scene_lights ? 1 : 0);
-  }
+  std::size_t distant() const { return light_.environments.size() + light_.sh.size(); }
+  std::size_t lightings() const { return distant() + lamps_.lightings(); }
 
   /// Adds one path from `start` to sum[lighting]. Returns its vertices.
-  int add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
+  int add_path(const PathVertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
   /// The same, weighed by a lobe at `point` first. A lobe draws directions in the frame of the normal, tells their
   /// density, and what light from one of them counts, cosine and all.
@@ -76,27 +69,24 @@ class Estimator {
   int add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const;
 
   std::uint64_t rays_per_vertex() const {
-    std::uint64_t rays = 1;
+    std::uint64_t rays = 1 + lamps_.rays_per_vertex();
     for (const EnvironmentSampler& sampler : samplers_) rays += sampler.useful() ? 1 : 0;
-    rays += light_.lamps.size();
-    if (light_.scene_lights) rays += (emitters_.empty() ? 0 : 1) + scene_.lights.size();
     return rays;
   }
 
  private:
   template <class Lobe>
-  void add_lobe_sky(const Vertex&, const Lobe&, PathNumbers&, std::vector<Vec3d>& sum) const;
-  void add_sky_samples(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
-  void add_lamps(const Vertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
-  Vec3d emitter_light(const Vertex&, double pick, const Vec2<double>& u) const;
-  Vec3d punctual_light(const Vertex&, const Light&) const;
+  void add_lobe_sky(const PathVertex&, const Lobe&, PathNumbers&, std::vector<Vec3d>& sum) const;
+  void add_sky_samples(const PathVertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
+  void add_lamps(const PathVertex&, const Vec3d& weight, int depth, PathNumbers&, std::vector<Vec3d>& sum) const;
+  std::span<Vec3d> lamps_of(std::vector<Vec3d>& sum) const { return std::span(sum).subspan(distant()); }
   void add_sky(const Vec3d& w, double density, const Vec3d& weight, std::vector<Vec3d>& sum) const;
 
   const Tracer& tracer_;
   const Scene& scene_;
   const ReferenceLight& light_;
   const ReferenceOptions& options_;
-  EmitterSampler emitters_;
+  LampLight lamps_;
   std::vector<EnvironmentSampler> samplers_;
 };
 
@@ -118,7 +108,7 @@ void Estimator::add_sky(const Vec3d& w, double density, const Vec3d& weight, std
 }
 
 /// One ray to the bright part of each map, where there is one.
-void Estimator::add_sky_samples(const Vertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
+void Estimator::add_sky_samples(const PathVertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
                                 std::vector<Vec3d>& sum) const {
   for (std::size_t k = 0; k < samplers_.size(); ++k) {
     if (!samplers_[k].useful()) continue;
@@ -130,57 +120,29 @@ void Estimator::add_sky_samples(const Vertex& v, const Vec3d& weight, int depth,
   }
 }
 
-/// Irradiance / pi from one point of the emitters, weighed against the path's own chance to find it.
-Vec3d Estimator::emitter_light(const Vertex& v, double pick, const Vec2<double>& u) const {
-  const EmitterSample to = emitters_.sample(pick, u);
-  const Vec3d way = to.position - v.position;
-  const double distance2 = dot(way, way);
-  const Vec3d w = normalized(way);
-  const double facing = -dot(w, to.normal), own = dot(w, v.normal) / std::numbers::pi;
-  if (distance2 == 0 || own <= 0 || (to.double_sided ? facing == 0 : facing <= 0)) return {};
-  const Vec3f from = lifted(v);
-  const Vec3d end = to_double(offset_origin(to_float(to.position), to_float(facing < 0 ? -to.normal : to.normal)));
-  const Vec3d clear = end - to_double(from);
-  if (tracer_.occluded(from, to_float(normalized(clear)), static_cast<float>(length(clear)))) return {};
-  const double density = to.density * distance2 / std::abs(facing);  // per solid angle
-  return to.radiance * (own / (density + own));
-}
-
-Vec3d Estimator::punctual_light(const Vertex& v, const Light& light) const {
-  const LightArrival arrival = light_arrival(light, v.position);
-  const double cosine = dot(arrival.direction, v.normal);
-  if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
-  const Vec3f from = lifted(v);
-  Vec3d w = arrival.direction;
-  double far = arrival.distance;
-  if (std::isfinite(far)) {
-    const Vec3d clear = to_double(light.position) - to_double(from);
-    w = normalized(clear), far = length(clear);
-  }
-  if (tracer_.occluded(from, to_float(w), static_cast<float>(far))) return {};
-  return arrival.irradiance * (cosine / std::numbers::pi);
-}
-
-void Estimator::add_lamps(const Vertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
+void Estimator::add_lamps(const PathVertex& v, const Vec3d& weight, int depth, PathNumbers& numbers,
                           std::vector<Vec3d>& sum) const {
-  const std::size_t first = light_.environments.size() + light_.sh.size();
-  for (std::size_t k = 0; k < light_.lamps.size(); ++k) sum[first + k] += weight * punctual_light(v, light_.lamps[k]);
-  if (!light_.scene_lights) return;
-  Vec3d light;
-  if (!emitters_.empty()) light += emitter_light(v, numbers.number(), numbers.pair(depth));
-  for (const Light& lamp : scene_.lights) light += punctual_light(v, lamp);
-  sum.back() += weight * light;
+  LampLight::Draw draw;
+  if (depth >= options_.from) {
+    if (lamps_.has_emitters()) draw.emitter = numbers.number(), draw.place = numbers.pair(depth);
+    lamps_.add_direct(v, weight, draw, lamps_of(sum));
+  }
+  if (lamps_.has_beams() && depth != options_.bounces && depth + 1 >= options_.from) {
+    draw = {.pick = numbers.number(), .emitter = numbers.number(), .place = {}, .direction = {}};
+    draw.place = numbers.pair(depth), draw.direction = numbers.pair(depth);
+    lamps_.add_beam(v, weight, draw, lamps_of(sum));
+  }
 }
 
-int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
-  Vertex v = start;
+int Estimator::add_path(const PathVertex& start, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+  PathVertex v = start;
   Vec3d weight{1, 1, 1};
   int depth = 0;
   for (;; ++depth) {
     const bool counts = depth >= options_.from;
     const Vec3d local = cosine_hemisphere(numbers.pair(depth));
     if (counts) add_sky_samples(v, weight, depth, numbers, sum);
-    if (counts) add_lamps(v, weight, depth, numbers, sum);
+    add_lamps(v, weight, depth, numbers, sum);
 
     const Vec3d w = normalized(basis_around(v.normal).to_world(local));
     const double density = std::max(local.z, 1e-30) / std::numbers::pi;
@@ -195,11 +157,7 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
     if (hit.back && !scene_.materials[static_cast<std::size_t>(part.material)].double_sided) break;
     const double side = hit.back ? -1 : 1;
     const Vec3d face = to_double(p.geometric_normal) * side;
-    if (counts && light_.scene_lights && emitters_.density(hit.triangle) > 0) {
-      const double other =
-          emitters_.density(hit.triangle) * double{hit.t} * double{hit.t} / std::max(1e-12, std::abs(dot(w, face)));
-      sum.back() += times(weight, emission_at(scene_, p)) * (density / (density + other));
-    }
+    if (counts) lamps_.add_met(v, w, density, hit, p, weight, lamps_of(sum));
 
     if (depth == options_.bounces) break;
     weight = times(weight, albedo_at(scene_, p));
@@ -209,7 +167,8 @@ int Estimator::add_path(const Vertex& start, PathNumbers& numbers, std::vector<V
       weight = weight / alive;
     }
     if (alive <= 0) break;
-    v = {to_double(p.position), to_double(p.normal) * side, face};
+    const double area = density * std::abs(dot(w, face)) / (double{hit.t} * double{hit.t});
+    v = {to_double(p.position), to_double(p.normal) * side, face, area};
   }
   return depth + 1;
 }
@@ -267,7 +226,8 @@ class KernelLobe {
 };
 
 template <class Lobe>
-void Estimator::add_lobe_sky(const Vertex& v, const Lobe& lobe, PathNumbers& numbers, std::vector<Vec3d>& sum) const {
+void Estimator::add_lobe_sky(const PathVertex& v, const Lobe& lobe, PathNumbers& numbers,
+                             std::vector<Vec3d>& sum) const {
   const Basis<double> basis = basis_around(v.normal);
   for (std::size_t k = 0; k < samplers_.size(); ++k) {
     if (!samplers_[k].useful()) continue;
@@ -281,7 +241,7 @@ void Estimator::add_lobe_sky(const Vertex& v, const Lobe& lobe, PathNumbers& num
 template <class Lobe>
 int Estimator::add_lobe_path(const ReferencePoint& point, const Lobe& lobe, PathNumbers& numbers,
                              std::vector<Vec3d>& sum) const {
-  const Vertex v{to_double(point.position), normalized(to_double(point.normal)), to_double(point.face_normal)};
+  const PathVertex v{to_double(point.position), normalized(to_double(point.normal)), to_double(point.face_normal)};
   if (!lobe.seen()) return 1;
   const Vec3d l = lobe.draw(numbers.pair(0));
   add_lobe_sky(v, lobe, numbers, sum);
@@ -351,7 +311,7 @@ ReferenceResult trace_reference(const Tracer& tracer, std::span<const ReferenceP
       estimator, points.size(), options, threads,
       [&](std::size_t point, PathNumbers& numbers, std::vector<Vec3d>& sum) {
         const ReferencePoint& p = points[point];
-        const Vertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
+        const PathVertex start{to_double(p.position), normalized(to_double(p.normal)), to_double(p.face_normal)};
         return estimator.add_path(start, numbers, sum);
       });
 }

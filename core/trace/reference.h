@@ -4,10 +4,9 @@
 //   value(x, n) = irradiance / pi = radiance that leaves a white Lambertian point
 //               = 1/pi * integral over the hemisphere of n of L(x, w) (n.w) dw
 // Paper   Kajiya 1986.   Units  W m^-2 sr^-1.   Repeat  same bits for any thread count.
-// Method  cosine-distributed paths; at each vertex one more ray to each environment map that is not constant, one to
-// the
-//         emitters (both joined with the path's own ray by the balance heuristic, Veach and Guibas 1995) and one to
-//         each punctual light. A path ends at the back of a single-sided face, which is black.
+// Method  cosine-distributed paths; at each vertex one more ray to each environment map that is not constant, joined
+//         with the path's own by the balance heuristic (Veach and Guibas 1995), and what lamps bring (lamp_light.h).
+//         A path ends at the back of a single-sided face, which is black.
 // Cost    points x samples x path length closest-hit rays, and the rays above.
 // Error   unbiased up to `bounces` (albedos are limited to 0.999, as everywhere in Kiln); standard error from the two
 //         halves of the samples.

@@ -60,6 +60,7 @@ const withInterval = (c: { relrmse: number; interval?: [number, number] }): stri
 
 const kSources: readonly (readonly [string, string])[] = [
   ['noise', 'Error from noise'],
+  ['noise_of_reflections', 'of reflected light'],
   ['interpolation', 'from interpolation'],
   ['bounce_tail', 'from bounces left out'],
   ['quantisation', 'from quantisation'],
