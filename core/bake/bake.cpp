@@ -107,6 +107,7 @@ struct Pass {
   std::vector<StreamBytes> streams;
   std::size_t rank = 0;  // of the stored components; 0: raw
   BakedScene decoded;
+  std::uint64_t bounce_rays = 0;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
@@ -159,6 +160,7 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   log.begin("write", 0.9);
   const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
   const NoiseProbes noise = std::move(transport.noise);
+  pass.bounce_rays = transport.bounce_rays;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   if (baked.glossy)
@@ -210,10 +212,12 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
   const ErrorStats& error = pass.certificate->transport;
   PassRecord out{.order = pass.plan.order,
                  .samples = pass.plan.samples,
+                 .bounce_samples = pass.plan.bounce_samples,
                  .bounces = pass.plan.bounces,
                  .triangles = pass.decoded.scene.mesh.triangles.size(),
                  .vertices = pass.decoded.scene.mesh.position.size(),
                  .rays = rays,
+                 .bounce_rays = pass.bounce_rays,
                  .seconds = seconds,
                  .certificate_seconds = pass.certificate->seconds,
                  .elapsed_s = elapsed_s,

@@ -1,7 +1,8 @@
 #pragma once
 // Where the error of a bake comes from, in the unit of its certificate: relRMSE under the lightings that were judged.
 //
-//   noise          of the rays, from two independent draws at a few hundred vertices; interpolation halves its variance;
+//   noise          of the rays, from two independent draws at a few hundred vertices; interpolation halves its
+//   variance;
 //                  noise_of_reflections is the part of it that the rays between surfaces have
 //   bounce_tail    share of the light in reflections beyond the last, from the plan's sample paths
 //   quantisation   rounding of the stored numbers, compression   components that are not stored: what a reader finds at
@@ -25,7 +26,7 @@ struct ErrorSources {
   std::optional<double> truncation;
 };
 
-ErrorSources split_error(const Certificate&, const BakedScene& decoded, const NoiseProbes& noise,
-                         const StorageProbes&, double tail_left);
+ErrorSources split_error(const Certificate&, const BakedScene& decoded, const NoiseProbes& noise, const StorageProbes&,
+                         double tail_left);
 
 }  // namespace kiln

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace kiln {
 namespace {
@@ -15,8 +16,20 @@ constexpr double kMostCost = 8;                         // and of their product:
 constexpr double kLeastGrowth = 1.3;                    // below it another pass is not worth its cost
 constexpr double kShareOfWall = 0.8;                    // of limits.wall_s, beyond which the job would be killed
 constexpr double kMaxRays = 65536;
+constexpr double kGatherRay = 4, kTriangle = 300;  // costs of a ray between surfaces and of a triangle: measured
 
 double square(double x) { return x * x; }
+
+/// What a pass costs, in shadow rays: it must not depend on a clock.
+struct Parts {
+  double direct, reflected, triangles;
+
+  explicit Parts(const PassRecord& pass)
+      : direct(static_cast<double>(pass.rays - pass.bounce_rays)),
+        reflected(kGatherRay * static_cast<double>(pass.bounce_rays)),
+        triangles(kTriangle * static_cast<double>(pass.triangles)) {}
+  double all() const { return direct + reflected + triangles; }
+};
 
 /// Seconds that grow with rays and triangles.
 double work(const PassRecord& pass) { return std::max(1e-3, pass.seconds - pass.certificate_seconds); }
@@ -62,18 +75,9 @@ double Passes::time_growth() const {
   return left / work(now);
 }
 
-/// Seconds of a triangle are a + b rays, from the last two passes; b rays alone until two differ in rays.
-double Passes::cost(Growth growth) const {
-  const PassRecord& now = all_.back();
-  const PassRecord* before = all_.size() > 1 ? &all_[all_.size() - 2] : nullptr;
-  double share = 1;  // of the rays in the last pass's work
-  if (before && before->order == now.order && before->samples < now.samples) {
-    const double rate = work(now) / static_cast<double>(now.triangles);
-    const double slope =
-        (rate - work(*before) / static_cast<double>(before->triangles)) / (now.samples - before->samples);
-    share = std::clamp(slope * now.samples / rate, 0.2, 1.0);
-  }
-  return growth.triangles * (1 - share + share * growth.samples);
+double Passes::cost(Growth g) const {
+  const Parts parts(all_.back());
+  return g.triangles * (parts.direct * g.direct + parts.reflected * g.reflected + parts.triangles) / parts.all();
 }
 
 /// From two passes of one order that differ in triangles; three quarters until there are such.
@@ -92,19 +96,49 @@ bool Passes::free_triangles() const {
   return step_.subdivide.mode != PrtStep::Subdivision::Mode::off && !step_.subdivide.triangles;
 }
 
-/// Growth that brings the error to `wanted`, as cheaply as the model knows.
-Passes::Growth Passes::towards(double wanted) const {
-  const bool free_samples = !step_.samples, free_triangles = this->free_triangles();
+/// The squared error of a pass that has grown.
+double Passes::predicted(Growth g) const {
   const ErrorSources& s = all_.back().sources;
-  const double noise = square(s.noise), space = square(s.interpolation), p = interpolation_power();
-  const double left = std::max(square(wanted) - square(s.bounce_tail) - square(s.quantisation), 0.1 * square(wanted));
-  double space_share = left / (1 + 2 * p), noise_share = left - space_share;
-  if (noise <= noise_share || !free_samples) space_share = std::max(left - noise, 0.1 * left);
-  if (space <= space_share || !free_triangles) noise_share = std::max(left - space, 0.1 * left);
-  Growth growth;
-  if (free_samples) growth.samples = std::clamp(noise / noise_share, 1.0, kMostSamples);
-  if (free_triangles) growth.triangles = std::clamp(std::pow(space / space_share, 1 / (2 * p)), 1.0, kMostTriangles);
-  return growth;
+  const double reflected = square(s.noise_of_reflections), direct = square(s.noise) - reflected;
+  return direct / g.direct + reflected / g.reflected +
+         square(s.interpolation) * std::pow(g.triangles, -2 * interpolation_power()) + square(s.bounce_tail) +
+         square(s.quantisation) + square(s.compression);
+}
+
+/// The fewest rays that leave so much noise, by Lagrange: rays of each kind as the root of noise over cost.
+Passes::Growth Passes::rays_for(double noise) const {
+  if (step_.samples) return {};
+  const ErrorSources& s = all_.back().sources;
+  const Parts cost(all_.back());
+  const double reflected = square(s.noise_of_reflections), direct = std::max(0.0, square(s.noise) - reflected);
+  const auto limited = [](double growth) { return std::clamp(growth, 1.0, kMostSamples); };
+  if (noise <= 0) return {kMostSamples, kMostSamples, 1};
+  const double both = std::sqrt(direct * cost.direct) + std::sqrt(reflected * cost.reflected);
+  const auto growth = [&](double own, double price) { return own > 0 ? std::sqrt(own / price) * both / noise : 0; };
+  Growth out{limited(growth(direct, cost.direct)), limited(growth(reflected, cost.reflected)), 1};
+  if (out.direct == 1) out.reflected = limited(noise > direct ? reflected / (noise - direct) : kMostSamples);
+  if (out.reflected == 1) out.direct = limited(noise > reflected ? direct / (noise - reflected) : kMostSamples);
+  return out;
+}
+
+/// The cheapest growth that brings the error to `wanted`, or nearly as near to it as any.
+Passes::Growth Passes::towards(double wanted) const {
+  constexpr int kSteps = 48;
+  constexpr double kNearly = 1.25;  // of the squared error
+  std::vector<Growth> all;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= (free_triangles() ? kSteps : 0); ++i) {
+    Growth noiseless;
+    noiseless.direct = noiseless.reflected = std::numeric_limits<double>::infinity();
+    noiseless.triangles = std::pow(kMostTriangles, i / double{kSteps});
+    Growth growth = rays_for(square(wanted) - predicted(noiseless));
+    growth.triangles = noiseless.triangles;
+    least = std::min(least, predicted(growth));
+    all.push_back(growth);
+  }
+  const double near = std::max(square(wanted) * (1 + 1e-9), kNearly * least);
+  std::erase_if(all, [&](const Growth& g) { return predicted(g) > near; });
+  return *std::ranges::min_element(all, {}, [&](const Growth& g) { return cost(g); });
 }
 
 /// The lowest error that a cost of `most` buys.
@@ -119,14 +153,14 @@ Passes::Growth Passes::within(double most) const {
 
 std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& scene) {
   Plan plan = last;
-  const auto more = [&](int samples) {
-    return static_cast<int>(std::min(kMaxRays, std::ceil(samples * growth.samples / 16) * 16));
+  const auto more = [](int samples, double times) {
+    return static_cast<int>(std::min(kMaxRays, std::ceil(samples * times / 16) * 16));
   };
   if (!step_.samples) {
-    plan.samples = more(last.samples);
-    plan.noise = last.noise / std::sqrt(growth.samples);
-    plan.bounce_samples = more(last.bounce_samples);
-    plan.lamp_samples = more(last.lamp_samples);
+    plan.samples = more(last.samples, growth.direct);
+    plan.noise = last.noise / std::sqrt(growth.direct);
+    plan.lamp_samples = more(last.lamp_samples, growth.direct);
+    plan.bounce_samples = more(last.bounce_samples, growth.reflected);
   }
   if (growth.triangles > 1) {
     const double triangles = growth.triangles * static_cast<double>(all_.back().triangles);
@@ -199,7 +233,7 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
   if (cost(growth) < 1.05) {
     const bool free_samples = !step_.samples;
     if (free_samples && free_triangles()) {
-      growth = {kLeastGrowth, kLeastGrowth};
+      growth = {kLeastGrowth, kLeastGrowth, kLeastGrowth};
     } else {
       return end(promise_.target_error ? Ending::floor : Ending::time_spent,
                  "reached " + percent(all_.back().high) + "; what is left comes from what the recipe fixes: " +
@@ -211,7 +245,8 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
 
 Plan Passes::resume(const std::vector<PassRecord>& known, Plan plan, const Scene& scene) {
   for (const PassRecord& record : known) {
-    if (record.order != plan.order || record.samples != plan.samples) break;  // of another input after all
+    if (record.order != plan.order || record.samples != plan.samples || record.bounce_samples != plan.bounce_samples)
+      break;  // of another input after all
     add(record);
     auto following = next(plan, scene);
     if (!following) {  // the bake was cut off between its last pass and its end: that pass is needed again

@@ -2,10 +2,10 @@
 // The progressive loop: a bake that promised an error or a time advances in passes, and each ends with a whole,
 // certified artefact. After a pass the next is planned from where the error of the last came from.
 //
-//   noise ~ 1 / sqrt(rays a vertex),  interpolation ~ triangles^-p,  seconds ~ triangles (a + b rays)
-// so that of a wanted squared error the cheapest share for interpolation is about 1 / (1 + 2 p): the rest is noise.
-// Passes begin afresh with more of both: with a growth of four the earlier ones cost a third of the last. The newest is
-// delivered, not the one whose certificate was luckiest.
+//   noise of direct and of reflected light ~ 1 / sqrt(rays a vertex that each takes),  interpolation ~ triangles^-p,
+//   cost ~ triangles (a + rays of direct light + b rays of reflected light)
+// Of all growths of the three that reach a wanted error the cheapest is taken. Passes begin afresh: with a growth of
+// four the earlier ones cost a third of the last. The newest is delivered, not the one whose certificate was luckiest.
 // Repeat  a target alone gives the same passes and bytes on any machine that is not stopped by limits.wall_s; a time
 //         budget cannot.
 
@@ -23,9 +23,9 @@ namespace kiln {
 
 /// What one pass spent and reached.
 struct PassRecord {
-  int order = 0, samples = 0, bounces = 0;
-  std::uint64_t triangles = 0, vertices = 0;  // of the result
-  std::uint64_t rays = 0;
+  int order = 0, samples = 0, bounce_samples = 0, bounces = 0;
+  std::uint64_t triangles = 0, vertices = 0;    // of the result
+  std::uint64_t rays = 0, bounce_rays = 0;      // of all, those between surfaces
   double seconds = 0, certificate_seconds = 0;  // all of it, and the part that does not grow with the work
   double elapsed_s = 0;                         // of the bake when the pass ended
   double relrmse = 0, low = 0, high = 0;        // transport, with its interval
@@ -59,7 +59,7 @@ class Passes {
 
  private:
   struct Growth {
-    double samples = 1, triangles = 1;
+    double direct = 1, reflected = 1, triangles = 1;  // rays a vertex, and triangles
   };
   std::optional<Plan> end(Outlook::Ending, std::string reason);
   bool transport_met() const;
@@ -67,7 +67,9 @@ class Passes {
   bool stuck() const;
   bool free_triangles() const;  // the recipe leaves their number open
   double time_growth() const;
-  double cost(Growth) const;  // in works of the last pass
+  Growth rays_for(double noise_squared) const;
+  double cost(Growth) const;  // in costs of the last pass
+  double predicted(Growth) const;
   double interpolation_power() const;
   Growth towards(double wanted) const;
   Growth within(double most) const;

@@ -252,6 +252,7 @@ ordered_json pass_list(const Passes& passes) {
   for (const PassRecord& p : passes.all()) {
     list.push_back({{"order", p.order},
                     {"samples", p.samples},
+                    {"bounce_samples", p.bounce_samples},
                     {"bounces", p.bounces},
                     {"triangles", p.triangles},
                     {"vertices", p.vertices},
