@@ -9,12 +9,14 @@
 
 namespace kiln {
 
-FlippedPaths::FlippedPaths(const Tracer& tracer, const Lamps& lamps, const HitAlbedo& albedo, int order, bool lit)
+FlippedPaths::FlippedPaths(const Tracer& tracer, const Lamps& lamps, const HitAlbedo& albedo, int order, bool lit,
+                           const BrightSpots* spots)
     : tracer_(tracer),
       lamps_(lamps),
       albedo_(albedo),
       order_(order),
       lit_(lit),
+      spots_(spots),
       rows_(static_cast<std::size_t>(3 * sh_count(order))) {}
 
 void FlippedPaths::clear() {
@@ -37,12 +39,17 @@ void FlippedPaths::add(const FlippedHit& hit, Random& random) {
   const auto draw = static_cast<std::uint32_t>(random.next());
   const Vec3f throughput = hit.throughput * albedo_.read(albedo_.tap(hit.triangle, hit.u, hit.v, draw));
   if (throughput == Vec3f{}) return;
-  waiting_[static_cast<std::size_t>(count_++)] = {offset_origin(position, up), up, throughput, hit.reflections};
+  waiting_[static_cast<std::size_t>(count_++)] = {offset_origin(position, up), up, throughput, hit.reflections, hit.by};
   if (count_ == kPacket) trace_waiting(random);
 }
 
 void FlippedPaths::finish(Random& random) {
   while (count_ > 0) trace_waiting(random);
+}
+
+Vec3f FlippedPaths::lamp_light(const Step& s) const {
+  const Receiver at{s.origin, s.normal};
+  return spots_ != nullptr && s.by.rays > 0 ? spots_->gathered(lamps_, at, s.by) : lamps_.punctual(at);
 }
 
 void FlippedPaths::trace_waiting(Random& random) {
@@ -52,7 +59,7 @@ void FlippedPaths::trace_waiting(Random& random) {
   Rays16 rays{};
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const Step& s = steps[i];
-    if (lit_) fixed_ += s.throughput * lamps_.punctual({s.origin, s.normal});
+    if (lit_) fixed_ += s.throughput * lamp_light(s);
     const float x = random.uniform(), y = random.uniform();
     const Vec3f w = basis_around(s.normal).to_world(cosine_hemisphere(Vec2f{x, y}));
     rays.ox[i] = s.origin.x, rays.oy[i] = s.origin.y, rays.oz[i] = s.origin.z;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/prt/bright_spots.h"
 #include "core/prt/hit_albedo.h"
 #include "core/prt/lamps.h"
 #include "core/trace/tracer.h"
@@ -21,12 +22,13 @@ struct FlippedHit {
   Vec3f direction;  // of the ray that hit
   Vec3f throughput{1, 1, 1};
   int reflections = 0;
+  BrightSpots::Gathering by;  // of the gathering ray; rays 0: looks know nothing of this hit
 };
 
 class FlippedPaths {
  public:
-  /// Order of SH; `lit`: lamp light is wanted too.
-  FlippedPaths(const Tracer&, const Lamps&, const HitAlbedo&, int order, bool lit);
+  /// Order of SH; `lit`: lamp light is wanted too, but for what looks at `spots` (may be null) find.
+  FlippedPaths(const Tracer&, const Lamps&, const HitAlbedo&, int order, bool lit, const BrightSpots* spots);
 
   void clear();
   void add(const FlippedHit&, Random&);
@@ -41,7 +43,9 @@ class FlippedPaths {
   struct Step {
     Vec3f origin, normal, throughput;
     int reflections = 0;
+    BrightSpots::Gathering by;
   };
+  Vec3f lamp_light(const Step&) const;
   void trace_waiting(Random&);
   void add_sky(const Vec3f& direction, const Vec3f& throughput);
 
@@ -50,6 +54,7 @@ class FlippedPaths {
   const HitAlbedo& albedo_;
   int order_;
   bool lit_;
+  const BrightSpots* spots_;
   std::array<Step, kPacket> waiting_;
   int count_ = 0;
   std::vector<float> rows_;

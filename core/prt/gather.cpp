@@ -1,7 +1,10 @@
 #include "core/prt/gather.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
+#include "core/mesh/topology.h"
 #include "core/prt/row_sum.h"
 #include "core/sphere/sh.h"
 
@@ -16,7 +19,9 @@ void prefetch_row(const std::int16_t* row, int stride) {
 }  // namespace
 
 Gatherer::Gatherer(const GatherSource& source)
-    : source_(source), paths_(source.tracer, source.lamps, source.albedo, source.order, !source.fixed.empty()) {
+    : source_(source),
+      paths_(source.tracer, source.lamps, source.albedo, source.order, !source.fixed.empty(),
+             source.spots != nullptr ? &source.spots->spots : nullptr) {
   const auto stride = static_cast<std::size_t>(source.rows.stride());
   plain_sum_.resize(stride);
   textured_sum_.resize(stride);
@@ -31,6 +36,7 @@ void Gatherer::gather(const TransferPoint& point) {
   std::fill(textured_sum_.begin(), textured_sum_.end(), 0.0F);
   std::fill(plain_sum_.begin(), plain_sum_.end(), 0);
   fixed_ = {};
+  normal_ = point.normal;
   paths_.clear();
 
   const Vec3f origin = ray_origin(point);
@@ -47,6 +53,9 @@ void Gatherer::gather(const TransferPoint& point) {
   }
   rays_ += static_cast<std::uint64_t>(source_.sets.samples());
   finish();
+  if (source_.spots == nullptr) return;
+  fixed_ += source_.spots->spots.look({origin, normal_}, source_.sets.samples(), random_);
+  rays_ += static_cast<std::uint64_t>(BrightSpots::looks(source_.sets.samples()));
 }
 
 void Gatherer::trace(Packet& packet, const LocalFrame& frame, int index) {
@@ -73,7 +82,9 @@ void Gatherer::choose(Packet& packet) {
     const float u = packet.hits.u[i], v = packet.hits.v[i];
     const HitSide side = source_.faces.side(t, direction);
     if (side == HitSide::flipped) {
-      paths_.add({t, u, v, direction, {1, 1, 1}, source_.pass}, random_);
+      BrightSpots::Gathering by;
+      if (source_.spots != nullptr) by = gathering(t, direction, packet.hits.t[i]);
+      paths_.add({t, u, v, direction, {1, 1, 1}, source_.pass, by}, random_);
     }
     if (side != HitSide::front) continue;
     const float pick = (static_cast<float>(bits & 0xffffU) + 0.5F) * 0x1p-16F;
@@ -102,7 +113,11 @@ void Gatherer::add(const Packet& packet) {
     if (vertex == kNoHit) continue;
     if (source_.faces.is_plain(packet.hits.triangle[i])) {
       rows[count++] = source_.rows.row(vertex);
-      if (!source_.fixed.empty()) fixed_ += source_.fixed[vertex];
+      if (source_.fixed.empty()) continue;
+      fixed_ += source_.fixed[vertex];
+      if (source_.spots != nullptr)
+        fixed_ +=
+            left_to_looks(packet, i) * -source_.faces.plain(source_.tracer.scene().mesh.part[packet.hits.triangle[i]]);
     } else {
       add_textured(packet, i);
     }
@@ -116,7 +131,35 @@ void Gatherer::add_textured(const Packet& packet, std::size_t lane) {
   fill_weights(rgb.data(), source_.channels, sh_count(source_.order), weight_.data());
   const std::uint32_t vertex = packet.vertex[lane];
   add_weighted_row(source_.rows.row(vertex), weight_.data(), source_.rows.stride(), textured_sum_.data());
-  if (!source_.fixed.empty()) fixed_ += albedo * source_.fixed[vertex];
+  if (source_.fixed.empty()) return;
+  fixed_ += albedo * source_.fixed[vertex];
+  if (source_.spots != nullptr) fixed_ += left_to_looks(packet, lane) * -albedo;
+}
+
+BrightSpots::Gathering Gatherer::gathering(std::uint32_t triangle, const Vec3f& direction, float distance) const {
+  const Mesh& mesh = source_.tracer.scene().mesh;
+  const Vec3f face = normalized(area_vector(mesh, mesh.triangles[triangle]), -direction);
+  const float cosine = std::max(dot(normal_, direction), 0.0F), facing = std::abs(dot(face, direction));
+  const int rays = source_.sets.samples();
+  return {rays, static_cast<float>(rays) * cosine * facing /
+                    (std::numbers::pi_v<float> * std::max(distance * distance, 1e-20F))};
+}
+
+/// Direct light of the vertex that was read which looks find, before it is reflected.
+Vec3f Gatherer::left_to_looks(const Packet& packet, std::size_t lane) const {
+  const std::uint32_t vertex = packet.vertex[lane], triangle = packet.hits.triangle[lane];
+  const auto shares = source_.spots->shares.of(vertex);
+  if (shares.empty()) return {};
+  const Vec3f direction{packet.rays.dx[lane], packet.rays.dy[lane], packet.rays.dz[lane]};
+  const Vec3f origin{packet.rays.ox[lane], packet.rays.oy[lane], packet.rays.oz[lane]};
+  const float distance = packet.hits.t[lane];
+  const BrightSpots::Gathering by = gathering(triangle, direction, distance);
+  const Mesh& mesh = source_.tracer.scene().mesh;
+  const Vec3f face = normalized(area_vector(mesh, mesh.triangles[triangle]), -direction);
+  Vec3f sum;
+  for (const SpotShares::Share& s : shares)
+    sum += s.share * source_.spots->spots.share_of_looks(s.lamp, origin + direction * distance, face, by);
+  return sum * source_.spots->direct[vertex];
 }
 
 void Gatherer::finish() {

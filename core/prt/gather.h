@@ -15,8 +15,16 @@
 #include "core/prt/gather_faces.h"
 #include "core/prt/packed_rows.h"
 #include "core/prt/ray_origin.h"
+#include "core/prt/spot_shares.h"
 
 namespace kiln {
+
+/// Spots near lamps, and the direct light of the lamps at each vertex.
+struct SpotSource {
+  const BrightSpots& spots;
+  const SpotShares& shares;
+  const std::vector<Vec3f>& direct;
+};
 
 /// What a pass reads. `fixed` is empty or one RGB a vertex; it and `rows` hold exit light on plain parts.
 struct GatherSource {
@@ -31,6 +39,7 @@ struct GatherSource {
   int channels = 3;
   int pass = 0;  // reflections already in `rows`
   std::uint64_t seed = 0;
+  const SpotSource* spots = nullptr;
 };
 
 /// Sums of one vertex, and room to work in. One for each block of vertices.
@@ -56,6 +65,8 @@ class Gatherer {
   void tap(Packet&);
   void add(const Packet&);
   void add_textured(const Packet&, std::size_t lane);
+  BrightSpots::Gathering gathering(std::uint32_t triangle, const Vec3f& direction, float distance) const;
+  Vec3f left_to_looks(const Packet&, std::size_t lane) const;
   void finish();
 
   const GatherSource& source_;
@@ -64,7 +75,7 @@ class Gatherer {
   std::vector<std::int32_t> plain_sum_;
   std::vector<float> textured_sum_, weight_, result_;
   FlippedPaths paths_;
-  Vec3f fixed_;
+  Vec3f fixed_, normal_;
   std::uint64_t rays_ = 0;
 };
 

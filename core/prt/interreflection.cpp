@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
@@ -48,8 +49,11 @@ std::vector<std::uint8_t> shares_of(const Mesh& mesh) {
   return out;
 }
 
-bool is_grey(const std::vector<Vec3f>& light) {
-  return std::all_of(light.begin(), light.end(), [](const Vec3f& x) { return x.x == x.y && x.y == x.z; });
+bool is_grey(const Vec3f& x) { return x.x == x.y && x.y == x.z; }
+
+/// Of direct light at vertices, and of lights that may light nothing but places between them.
+bool lamps_are_grey(const std::vector<Vec3f>& light, const Scene& scene) {
+  return std::ranges::all_of(light, is_grey) && std::ranges::all_of(scene.lights, is_grey, &Light::intensity);
 }
 
 // Vectors of one pass: rows for distant light, RGB for lamps.
@@ -77,13 +81,14 @@ class Solver {
         direct_(params.order, 1, direct_storage_.data(), PackedRows::row_bytes(params.order, 1)),
         fixed_direct_(std::move(fixed)) {
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) direct_.store(v, direct.data() + v * count());
-    const bool grey = (faces_.grey() || params.bounces == 0) && is_grey(fixed_direct_);
+    const bool grey = (faces_.grey() || params.bounces == 0) && lamps_are_grey(fixed_direct_, tracer.scene());
     out_ = {.order = params.order, .channels = grey ? 1 : 3, .fixed = !fixed_direct_.empty(), .coefficients = {}};
     pitch_ = pitch_of(out_);
   }
 
   Transfer solve(Threads& threads, TransferStats* stats, ProbeNoise* noise) {
     if (params_.bounces > 0) plan_work();
+    if (params_.bounces > 0 && !fixed_direct_.empty()) find_spots();
     out_.coefficients.resize(mesh_.position.size() * (pitch_ / sizeof(float)));
     Layer light = layer(0);  // T_0 = D
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) {
@@ -127,6 +132,20 @@ class Solver {
     if (!to.fixed.empty()) to.fixed[v] = fixed;
   }
 
+  void find_spots() {
+    double light = 0, all = 0;
+    for (const Triangle& t : mesh_.triangles) {
+      const double area = triangle_area(mesh_, t) / 3;
+      for (const std::uint32_t v : t)
+        light += area * (fixed_direct_[v].x + fixed_direct_[v].y + fixed_direct_[v].z) / 3;
+      all += 3 * area;
+    }
+    spots_.emplace(tracer_, all > 0 ? light / all : 0, params_.seed);
+    if (spots_->empty()) return;
+    shares_.emplace(*spots_, lamps_, mesh_, [this](std::uint32_t v) { return point_of(v); });
+    spot_source_.emplace(SpotSource{*spots_, *shares_, fixed_direct_});
+  }
+
   // The order of work, and who needs any: before the rows are there, since both take memory for a while.
   void plan_work() {
     order_ = morton_order(mesh_.position);
@@ -148,7 +167,7 @@ class Solver {
       std::vector<GatherSource> sources;
       for (const DirectionSets& s : sets)
         sources.push_back({tracer_, lamps_, faces_, albedo_, s, light.rows, light.fixed, params_.order, out_.channels,
-                           pass, params_.seed});
+                           pass, params_.seed, spot_source_ ? &*spot_source_ : nullptr});
       std::atomic<std::uint64_t> rays = 0;
       threads.for_blocks(order_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
         std::vector<Gatherer> gatherers(sources.begin(), sources.end());
@@ -250,6 +269,9 @@ class Solver {
   std::vector<std::uint32_t> order_;
   std::vector<bool> sees_surfaces_;
   std::vector<std::uint8_t> share_;
+  std::optional<BrightSpots> spots_;
+  std::optional<SpotShares> shares_;
+  std::optional<SpotSource> spot_source_;
   Transfer out_;
   std::size_t pitch_ = 0;
 };

@@ -32,16 +32,18 @@ void set_origin(Rays16& rays, const Vec3f& origin) {
 }  // namespace
 
 Vec3f Lamps::punctual(const Receiver& at) const {
-  Vec3d sum;
-  for (const Light& light : tracer_.scene().lights) {
-    const LightArrival arrival = light_arrival(light, to_double(at.origin));
-    const double cosine = dot(arrival.direction, to_double(at.normal));
-    if (cosine <= 0 || arrival.irradiance == Vec3d{}) continue;
-    const double far = std::min(arrival.distance * kShortfall, double{kFar});
-    if (tracer_.occluded(at.origin, to_float(arrival.direction), static_cast<float>(far))) continue;
-    sum += arrival.irradiance * (cosine * kInversePi);
-  }
-  return to_float(sum);
+  Vec3f sum;
+  for (const Light& light : tracer_.scene().lights) sum += punctual(at, light);
+  return sum;
+}
+
+Vec3f Lamps::punctual(const Receiver& at, const Light& light) const {
+  const LightArrival arrival = light_arrival(light, to_double(at.origin));
+  const double cosine = dot(arrival.direction, to_double(at.normal));
+  if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
+  const double far = std::min(arrival.distance * kShortfall, double{kFar});
+  if (tracer_.occluded(at.origin, to_float(arrival.direction), static_cast<float>(far))) return {};
+  return to_float(arrival.irradiance * (cosine * kInversePi));
 }
 
 Vec3f Lamps::emitted(const Receiver& at, int samples, std::uint64_t seed) const {
@@ -113,6 +115,7 @@ Vec3d Lamps::from_rays(const Receiver& at, const Shares& shares, std::uint64_t s
 }
 
 Vec3f Lamps::emission(std::uint32_t triangle, float u, float v, const Vec3f& direction) const {
+  if (emitters_.density(triangle) == 0) return {};
   const Scene& scene = tracer_.scene();
   const SurfacePoint p = surface_point(scene, triangle, u, v);
   if (dot(p.geometric_normal, direction) >= 0 && !is_double_sided(scene, triangle)) return {};

@@ -31,8 +31,9 @@ class Lamps {
   bool none() const { return emitters_.empty() && tracer_.scene().lights.empty(); }
   bool has_emitters() const { return !emitters_.empty(); }
 
-  /// Irradiance / pi from the punctual lights: one shadow ray each.
+  /// Irradiance / pi from the punctual lights, or one of them: one shadow ray each.
   Vec3f punctual(const Receiver&) const;
+  Vec3f punctual(const Receiver&, const Light&) const;
   /// Irradiance / pi from the emitters: `samples` points on them and cosine_share(samples) rays.
   Vec3f emitted(const Receiver&, int samples, std::uint64_t seed) const;
   /// Radiance that leaves an emitter against a ray that hits it.

@@ -14,23 +14,10 @@ Vec3d times(const Vec3d& a, const Vec3f& b) { return a * to_double(b); }
 /// The side of its face that a vertex's rays leave from.
 Vec3d side_of(const PathVertex& v) { return dot(v.normal, v.face) < 0 ? -v.face : v.face; }
 
-/// Per solid angle, within the cone.
-double density_of_directions(const Light& light) {
-  constexpr double kNarrowest = 1e-6;
-  if (light.type != LightType::spot) return 0.25 / std::numbers::pi;
-  return 0.5 / std::numbers::pi / std::max(1 - std::cos(double{light.outer_cone}), kNarrowest);
-}
-
-Vec3d direction_of(const Light& light, const Vec2<double>& u) {
-  if (light.type != LightType::spot) return uniform_sphere(u);
-  const double z = 1 - u.x * (1 - std::cos(double{light.outer_cone})), r = std::sqrt(std::max(0.0, 1 - z * z)),
-               phi = 2 * std::numbers::pi * u.y;
-  return basis_around(normalized(to_double(light.direction))).to_world({r * std::cos(phi), r * std::sin(phi), z});
-}
-
 double power(const Light& light) {
   const double sum = double{light.intensity.x} + light.intensity.y + light.intensity.z;
-  return light.type == LightType::directional ? 0 : std::max(0.0, sum) / density_of_directions(light);
+  return light.type == LightType::directional ? 0
+                                              : std::max(0.0, sum) / beam_density(light, to_double(light.direction));
 }
 
 }  // namespace
@@ -75,8 +62,8 @@ std::uint64_t LampLight::rays_per_vertex() const {
 }
 
 /// Of beams at a vertex, per area.
-double LampLight::beam_density(const Sender& from, const LightArrival& arrival, const PathVertex& v) {
-  return from.share * density_of_directions(*from.light) * std::abs(dot(arrival.direction, v.face)) /
+double LampLight::density_of_beams(const Sender& from, const LightArrival& arrival, const PathVertex& v) {
+  return from.share * beam_density(*from.light, -arrival.direction) * std::abs(dot(arrival.direction, v.face)) /
          (arrival.distance * arrival.distance);
 }
 
@@ -86,7 +73,7 @@ Vec3d LampLight::sent(const Sender& from, const PathVertex& v) {
   const double cosine = dot(arrival.direction, v.normal);
   if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
   const double balance =
-      std::isfinite(v.density) && from.share > 0 ? v.density / (v.density + beam_density(from, arrival, v)) : 1;
+      std::isfinite(v.density) && from.share > 0 ? v.density / (v.density + density_of_beams(from, arrival, v)) : 1;
   return arrival.irradiance * (cosine / std::numbers::pi * balance);
 }
 
@@ -147,7 +134,7 @@ void LampLight::add_met(const PathVertex& v, const Vec3d& w, double density, con
 
 LampLight::Beam LampLight::draw_beam(const Sender& sender, const Draw& draw) const {
   if (sender.light != nullptr)
-    return {to_double(sender.light->position), direction_of(*sender.light, draw.direction), {}};
+    return {to_double(sender.light->position), beam_direction(*sender.light, draw.direction), {}};
   const EmitterSample from = emitters_.sample(draw.emitter, draw.place);
   const bool behind = from.double_sided && draw.direction.x < 0.5;
   const Vec2<double> u{from.double_sided ? std::fmod(2 * draw.direction.x, 1.0) : draw.direction.x, draw.direction.y};

@@ -68,7 +68,7 @@ class LampLight {
   void choose_senders();
   const Sender& pick(double u) const;
   Beam draw_beam(const Sender&, const Draw&) const;
-  static double beam_density(const Sender&, const LightArrival&, const PathVertex&);
+  static double density_of_beams(const Sender&, const LightArrival&, const PathVertex&);
   static Vec3d sent(const Sender&, const PathVertex&);
   Vec3d emitted(const EmitterSample&, const PathVertex&) const;
   Vec3d punctual(const Sender&, const PathVertex&) const;

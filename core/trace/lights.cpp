@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
@@ -47,6 +48,22 @@ LightArrival light_arrival(const Light& light, const Vec3d& point) {
   const Vec3d direction = way / distance;
   const double spread = light.type == LightType::spot ? cone(light, -direction) : 1;
   return {direction, distance, intensity * (spread * range_window(distance, light.range) / (distance * distance))};
+}
+
+Vec3d beam_direction(const Light& light, const Vec2<double>& u) {
+  if (light.type != LightType::spot) return uniform_sphere(u);
+  const double z = 1 - u.x * (1 - std::cos(double{light.outer_cone})), r = std::sqrt(std::max(0.0, 1 - z * z)),
+               phi = 2 * std::numbers::pi * u.y;
+  return basis_around(normalized(to_double(light.direction))).to_world({r * std::cos(phi), r * std::sin(phi), z});
+}
+
+double beam_density(const Light& light, const Vec3d& from_light) {
+  constexpr double kNarrowest = 1e-6;
+  if (light.type != LightType::spot) return 0.25 / std::numbers::pi;
+  const double outer = std::cos(double{light.outer_cone});
+  return dot(from_light, to_double(light.direction)) < outer - kNarrowest
+             ? 0
+             : 0.5 / std::numbers::pi / std::max(1 - outer, kNarrowest);
 }
 
 EmitterSampler::EmitterSampler(const Scene& scene) : scene_(scene) {

@@ -22,6 +22,11 @@ struct LightArrival {
 /// ramp between the cosines of outer and inner cone.
 LightArrival light_arrival(const Light&, const Vec3d& point);
 
+/// The directions in which a point or spot light shines, evenly: one of them (not of unit length to the last bit), and
+/// its density per solid angle.
+Vec3d beam_direction(const Light&, const Vec2<double>& u);
+double beam_density(const Light&, const Vec3d& from_light);
+
 /// A point of an emitter.
 struct EmitterSample {
   Vec3d position, normal;  // front side of the face
