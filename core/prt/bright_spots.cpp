@@ -13,6 +13,7 @@ namespace kiln {
 namespace {
 
 constexpr double kBright = 4;                 // times the mean
+constexpr float kBeyond = 1.01F;              // the longest of some thousand beams is not the longest of all
 constexpr std::uint32_t kBeamsOfLamp = 8192;  // traced; few scenes have as many as a hundred lamps
 constexpr float kInversePi = std::numbers::inv_pi_v<float>;
 constexpr float kShortfall = 1 - 4e-6F;  // a shadow ray ends this fraction before what it looks at
@@ -36,28 +37,36 @@ void BrightSpots::find_lamps(double mean_light) {
 }
 
 void BrightSpots::trace_beams(std::uint64_t seed) {
-  const Scene& scene = tracer_.scene();
   for (std::size_t k = 0; k < lamps_.size(); ++k) {
-    const auto& [light, reach] = lamps_[k];
+    float farthest = 0;
     for (std::uint32_t i = 0; i < kBeamsOfLamp; ++i) {
       const Vec2f u = sobol_owen(i, mix64(seed ^ (k << 32U)));
-      const Vec3f w = to_float(normalized(beam_direction(*light, {u.x, u.y})));
-      const Hit hit = tracer_.closest(light->position, w, reach);
-      if (!hit) continue;
-      const SurfacePoint p = surface_point(scene, hit.triangle, hit.u, hit.v);
-      const auto material = static_cast<std::size_t>(scene.parts[scene.mesh.part[hit.triangle]].material);
-      if (hit.back && !scene.materials[material].double_sided) continue;
-      const float side = hit.back ? -1 : 1;
-      const LightArrival arrival = light_arrival(*light, to_double(p.position));
-      const double cosine = dot(arrival.direction, to_double(p.normal)) * side;
-      if (cosine <= 0 || arrival.distance == 0) continue;
-      const Vec3f face = p.geometric_normal * side;
-      const Vec3f value = to_float(arrival.irradiance * (cosine * std::numbers::inv_pi));
-      beams_.push_back({offset_origin(p.position, face), face, albedo_at(scene, p) * value, 0});
-      beams_.back().density = density(k, p.position, face);  // for one beam in all
+      farthest = std::max(farthest, trace_beam(k, to_float(normalized(beam_direction(*lamps_[k].light, {u.x, u.y})))));
     }
+    // Beyond its own beams' ends a lamp lights nothing: a bulb in a lantern reaches the lantern.
+    lamps_[k].reach = std::min(lamps_[k].reach, kBeyond * farthest);
   }
   for (Beam& b : beams_) b.density /= static_cast<float>(beams_.size());
+}
+
+/// Keeps the beam if it lights something. Returns its length then, else 0.
+float BrightSpots::trace_beam(std::size_t lamp, const Vec3f& w) {
+  const Scene& scene = tracer_.scene();
+  const auto& [light, reach] = lamps_[lamp];
+  const Hit hit = tracer_.closest(light->position, w, reach);
+  if (!hit) return 0;
+  const SurfacePoint p = surface_point(scene, hit.triangle, hit.u, hit.v);
+  const auto material = static_cast<std::size_t>(scene.parts[scene.mesh.part[hit.triangle]].material);
+  if (hit.back && !scene.materials[material].double_sided) return 0;
+  const float side = hit.back ? -1 : 1;
+  const LightArrival arrival = light_arrival(*light, to_double(p.position));
+  const double cosine = dot(arrival.direction, to_double(p.normal)) * side;
+  if (cosine <= 0 || arrival.distance == 0) return 0;
+  const Vec3f face = p.geometric_normal * side;
+  const Vec3f value = to_float(arrival.irradiance * (cosine * std::numbers::inv_pi));
+  beams_.push_back(
+      {offset_origin(p.position, face), face, albedo_at(scene, p) * value, density(lamp, p.position, face)});
+  return hit.t;
 }
 
 /// Neighbours in space are neighbours in the list, so that looks at equal parts of it are spread over space.

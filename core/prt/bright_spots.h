@@ -56,6 +56,7 @@ class BrightSpots {
   };
   void find_lamps(double mean_light);
   void trace_beams(std::uint64_t seed);
+  float trace_beam(std::size_t lamp, const Vec3f& direction);
   void sort_beams();
   float density(std::size_t lamp, const Vec3f& place, const Vec3f& face) const;
 
