@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "core/sphere/sampling.h"
 
@@ -14,6 +15,21 @@ Vec3d times(const Vec3d& a, const Vec3f& b) { return a * to_double(b); }
 /// The side of its face that a vertex's rays leave from.
 Vec3d side_of(const PathVertex& v) { return dot(v.normal, v.face) < 0 ? -v.face : v.face; }
 
+/// Per area at a place, of cosine-distributed rays from a vertex that sees it.
+double density_at(const PathVertex& from, const Vec3d& place, const Vec3d& face) {
+  const Vec3d way = place - from.position, w = normalized(way);
+  return std::max(0.0, dot(w, from.normal)) * std::abs(dot(w, face)) / (std::numbers::pi * dot(way, way));
+}
+
+/// The point of a surface as it is seen from a place; nothing from behind a single-sided face, or along it.
+std::optional<PathVertex> seen_from(const Scene& scene, const SurfacePoint& p, const Vec3d& place) {
+  const double facing = dot(place - to_double(p.position), to_double(p.geometric_normal));
+  const auto material = static_cast<std::size_t>(scene.parts[scene.mesh.part[p.triangle]].material);
+  if (facing == 0 || (facing < 0 && !scene.materials[material].double_sided)) return std::nullopt;
+  const double side = facing < 0 ? -1 : 1;
+  return PathVertex{to_double(p.position), to_double(p.normal) * side, to_double(p.geometric_normal) * side};
+}
+
 double power(const Light& light) {
   const double sum = double{light.intensity.x} + light.intensity.y + light.intensity.z;
   return light.type == LightType::directional ? 0
@@ -21,6 +37,13 @@ double power(const Light& light) {
 }
 
 }  // namespace
+
+PathVertex vertex_after(const PathVertex& from, const Vec3d& position, const Vec3d& normal, const Vec3d& face) {
+  PathVertex out{position, normal, face, density_at(from, position, face)};
+  const double back = density_at(out, from.position, from.face);
+  out.against_beams = out.density / (1 + (std::isfinite(from.density) ? back / from.density : 0));
+  return out;
+}
 
 Vec3f lifted(const PathVertex& v) { return offset_origin(to_float(v.position), to_float(side_of(v))); }
 
@@ -58,7 +81,7 @@ const LampLight::Sender& LampLight::pick(double u) const {
 
 std::uint64_t LampLight::rays_per_vertex() const {
   const std::uint64_t emitters = scene_lights_ ? 1 : 0;  // the last sender
-  return senders_.size() - emitters + (has_emitters() ? 1 : 0) + (has_beams() ? 2 : 0);
+  return senders_.size() - emitters + (has_emitters() ? 1 : 0) + (has_beams() ? 4 : 0);
 }
 
 /// Of beams at a vertex, per area.
@@ -72,8 +95,9 @@ Vec3d LampLight::sent(const Sender& from, const PathVertex& v) {
   const LightArrival arrival = light_arrival(*from.light, v.position);
   const double cosine = dot(arrival.direction, v.normal);
   if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
-  const double balance =
-      std::isfinite(v.density) && from.share > 0 ? v.density / (v.density + density_of_beams(from, arrival, v)) : 1;
+  const double balance = std::isfinite(v.density) && from.share > 0
+                             ? v.against_beams / (v.against_beams + density_of_beams(from, arrival, v))
+                             : 1;
   return arrival.irradiance * (cosine / std::numbers::pi * balance);
 }
 
@@ -86,7 +110,7 @@ Vec3d LampLight::emitted(const EmitterSample& from, const PathVertex& v) const {
   if (distance2 == 0 || own <= 0 || (from.double_sided ? facing == 0 : facing <= 0)) return {};
   const double shadow_ray = from.density * distance2 / std::abs(facing);  // per solid angle, as all three
   const double beam = senders_.back().share * from.density * std::abs(dot(w, v.face)) /
-                      (std::numbers::pi * (from.double_sided ? 2 : 1) * v.density);
+                      (std::numbers::pi * (from.double_sided ? 2 : 1) * v.against_beams);
   return from.radiance * (own / (own + shadow_ray + beam));
 }
 
@@ -127,8 +151,8 @@ void LampLight::add_met(const PathVertex& v, const Vec3d& w, double density, con
       scene_.materials[static_cast<std::size_t>(scene_.parts[scene_.mesh.part[hit.triangle]].material)].double_sided;
   const double facing = std::max(1e-12, std::abs(dot(w, to_double(p.geometric_normal))));
   const double shadow_ray = strength * double{hit.t} * double{hit.t} / facing;
-  const double beam =
-      senders_.back().share * strength * std::abs(dot(w, v.face)) / (std::numbers::pi * (both ? 2 : 1) * v.density);
+  const double beam = senders_.back().share * strength * std::abs(dot(w, v.face)) /
+                      (std::numbers::pi * (both ? 2 : 1) * v.against_beams);
   sum[own_.size()] += times(weight, emission_at(scene_, p)) * (density / (density + shadow_ray + beam));
 }
 
@@ -143,27 +167,46 @@ LampLight::Beam LampLight::draw_beam(const Sender& sender, const Draw& draw) con
           basis_around(side).to_world(cosine_hemisphere(u)), from};
 }
 
-void LampLight::add_beam(const PathVertex& v, const Vec3d& weight, const Draw& draw, std::span<Vec3d> sum) const {
+/// Irradiance / pi that a beam brings to where it ended, in this way's part.
+Vec3d LampLight::carried(const Sender& sender, const Beam& beam, const PathVertex& lit) const {
+  if (dot(beam.direction, side_of(lit)) >= 0) return {};  // from behind
+  return sender.light != nullptr ? sent(sender, lit) : emitted(beam.emitter, lit);
+}
+
+void LampLight::add_beam(const PathVertex& v, const Vec3d& weight, const Draw& draw, bool once, bool twice,
+                         std::span<Vec3d> sum) const {
   const Sender& sender = pick(draw.pick);
   const Beam beam = draw_beam(sender, draw);
-  const Hit hit = tracer_.closest(to_float(beam.from), to_float(normalized(beam.direction)),
-                                  std::numeric_limits<float>::infinity());
-  if (!hit) return;
-  const SurfacePoint p = surface_point(scene_, hit.triangle, hit.u, hit.v);
-  const Vec3d way = to_double(p.position) - v.position;
-  const double distance2 = dot(way, way), cosine = dot(normalized(way), v.normal);
-  const double facing = -dot(normalized(way), to_double(p.geometric_normal));
-  const Material& material =
-      scene_.materials[static_cast<std::size_t>(scene_.parts[scene_.mesh.part[hit.triangle]].material)];
-  if (distance2 == 0 || cosine <= 0 || facing == 0 || (facing < 0 && !material.double_sided)) return;
+  const auto surface_along = [&](const Vec3f& from, const Vec3d& w) -> std::optional<SurfacePoint> {
+    const Hit hit = tracer_.closest(from, to_float(normalized(w)), std::numeric_limits<float>::infinity());
+    if (!hit) return std::nullopt;
+    return surface_point(scene_, hit.triangle, hit.u, hit.v);
+  };
+  const auto end = surface_along(to_float(beam.from), beam.direction);
+  if (!end) return;
+  const auto looked_at = [&](const SurfacePoint& p) -> std::optional<PathVertex> {
+    const auto seen = seen_from(scene_, p, v.position);
+    if (!seen || !(dot(seen->position - v.position, v.normal) > 0)) return std::nullopt;
+    return vertex_after(v, seen->position, seen->normal, seen->face);
+  };
+  if (const auto lit = once ? looked_at(*end) : std::nullopt) {
+    const Vec3d value = carried(sender, beam, *lit);
+    if (value != Vec3d{} && !in_shadow(v, lit->position, side_of(*lit)))
+      sum[sender.lighting] += times(weight, albedo_at(scene_, *end)) * value;
+  }
 
-  const double side = facing < 0 ? -1 : 1;
-  const PathVertex lit{to_double(p.position), to_double(p.normal) * side, to_double(p.geometric_normal) * side,
-                       cosine / std::numbers::pi * std::abs(facing) / distance2};
-  if (dot(beam.direction, side_of(lit)) >= 0) return;  // lit from behind
-  const Vec3d value = sender.light != nullptr ? sent(sender, lit) : emitted(beam.emitter, lit);
-  if (value == Vec3d{} || in_shadow(v, lit.position, side_of(lit))) return;
-  sum[sender.lighting] += times(weight, albedo_at(scene_, p)) * value;
+  const auto mirror = twice ? seen_from(scene_, *end, beam.from) : std::nullopt;
+  if (!mirror) return;
+  const auto second =
+      surface_along(lifted(*mirror), basis_around(mirror->normal).to_world(cosine_hemisphere(draw.reflection)));
+  if (!second) return;
+  const auto lit = looked_at(*second);
+  if (!lit || dot(mirror->position - lit->position, side_of(*lit)) <= 0) return;
+  const PathVertex before = vertex_after(*lit, mirror->position, mirror->normal, mirror->face);
+  if (!(before.density > 0)) return;
+  const Vec3d value = carried(sender, beam, before);
+  if (value != Vec3d{} && !in_shadow(v, lit->position, side_of(*lit)))
+    sum[sender.lighting] += times(times(weight, albedo_at(scene_, *end)), albedo_at(scene_, *second)) * value;
 }
 
 }  // namespace kiln

@@ -127,10 +127,14 @@ void Estimator::add_lamps(const PathVertex& v, const Vec3d& weight, int depth, P
     if (lamps_.has_emitters()) draw.emitter = numbers.number(), draw.place = numbers.pair(depth);
     lamps_.add_direct(v, weight, draw, lamps_of(sum));
   }
-  if (lamps_.has_beams() && depth != options_.bounces && depth + 1 >= options_.from) {
-    draw = {.pick = numbers.number(), .emitter = numbers.number(), .place = {}, .direction = {}};
-    draw.place = numbers.pair(depth), draw.direction = numbers.pair(depth);
-    lamps_.add_beam(v, weight, draw, lamps_of(sum));
+  const auto counts = [&](int reflections) {
+    return reflections >= options_.from && (options_.bounces < 0 || reflections <= options_.bounces);
+  };
+  const bool once = counts(depth + 1), twice = counts(depth + 2);
+  if (lamps_.has_beams() && (once || twice)) {
+    draw = {.pick = numbers.number(), .emitter = numbers.number(), .place = {}, .direction = {}, .reflection = {}};
+    draw.place = numbers.pair(depth), draw.direction = numbers.pair(depth), draw.reflection = numbers.pair(depth);
+    lamps_.add_beam(v, weight, draw, once, twice, lamps_of(sum));
   }
 }
 
@@ -167,8 +171,7 @@ int Estimator::add_path(const PathVertex& start, PathNumbers& numbers, std::vect
       weight = weight / alive;
     }
     if (alive <= 0) break;
-    const double area = density * std::abs(dot(w, face)) / (double{hit.t} * double{hit.t});
-    v = {to_double(p.position), to_double(p.normal) * side, face, area};
+    v = vertex_after(v, to_double(p.position), to_double(p.normal) * side, face);
   }
   return depth + 1;
 }
