@@ -7,12 +7,12 @@
 #include "core/artifact/evaluate.h"
 #include "core/artifact/eye.h"
 #include "core/bake/eye_material.h"
-#include "core/bake/surface_samples.h"
 #include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/bake/surface_samples.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {

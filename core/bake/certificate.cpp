@@ -11,12 +11,12 @@
 #include "core/artifact/evaluate.h"
 #include "core/bake/lightings.h"
 #include "core/bake/spending.h"
-#include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
 #include "core/prt/hidden.h"
 #include "core/trace/reference.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {

@@ -8,13 +8,13 @@
 #include "core/bake/direct_source.h"
 #include "core/bake/lightings.h"
 #include "core/bake/plan.h"
-#include "core/bake/surface_samples.h"
 #include "core/bake/transport.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/glossy_bake.h"
 #include "core/prt/interreflection.h"
 #include "core/sphere/sh.h"
 #include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {

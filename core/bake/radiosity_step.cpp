@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "core/bake/direct_source.h"
-#include "core/bake/surface_samples.h"
 #include "core/bake/transport.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/direct_light.h"
 #include "core/prt/ray_origin.h"
 #include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {

@@ -5,12 +5,12 @@
 #include <span>
 
 #include "core/bake/direct_source.h"
-#include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/prt/cut_lines.h"
 #include "core/prt/direct_transfer.h"
 #include "core/prt/interreflection.h"
+#include "core/trace/surface_samples.h"
 #include "core/trace/tracer.h"
 
 namespace kiln {

@@ -23,13 +23,13 @@
 #include "core/bake/error_stats.h"
 #include "core/bake/eye_material.h"
 #include "core/bake/lightings.h"
-#include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
 #include "core/prt/glossy_matrix.h"
 #include "core/sphere/quadrature.h"
 #include "core/trace/reference.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln::bench {
 namespace {

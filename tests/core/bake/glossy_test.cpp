@@ -14,9 +14,9 @@
 #include "core/bake/error_stats.h"
 #include "core/bake/eye_material.h"
 #include "core/bake/glossy_plan.h"
-#include "core/bake/surface_samples.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
+#include "core/trace/surface_samples.h"
 #include "tests/core/bake/bake_input.h"
 
 namespace kiln {

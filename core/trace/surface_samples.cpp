@@ -1,4 +1,4 @@
-#include "core/bake/surface_samples.h"
+#include "core/trace/surface_samples.h"
 
 #include <algorithm>
 #include <cmath>
