@@ -11,22 +11,26 @@
 namespace kiln {
 namespace {
 
-constexpr const char* kVersion = "1";
+constexpr const char* kVersion = "2";
 constexpr float kLeastHalf = 0x1p-24F;
-/// The parts of the corners that count: how many bytes each holds, one in a channel.
-struct CornerPart {
-  const char* name;
-  std::size_t first;
-  int channels;
-};
-constexpr CornerPart kCornerParts[] = {{"corners.px", 0, 3},      {"corners.nx", 3, 3},     {"corners.py", 6, 3},
-                                       {"corners.ny", 9, 3},      {"corners.pz", 12, 3},    {"corners.nz", 15, 3},
-                                       {"corners.room.0", 18, 4}, {"corners.room.1", 22, 4}};
 
+/// The parts of the corners that count, four bytes of a cell in each.
+constexpr std::array<const char*, 11> kCornerParts{
+    "corners.px",      "corners.nx",      "corners.py",      "corners.ny",     "corners.pz",    "corners.nz",
+    "corners.cells.x", "corners.cells.y", "corners.cells.z", "corners.room.0", "corners.room.1"};
+constexpr std::size_t kCornerChannels = 4, kCells = 4 * kDirections, kRooms = 6 * kDirections;
+
+/// Byte i of a cell, in the order of the parts and their channels.
 std::uint8_t& corner_byte(CellCorners& cell, std::size_t i) {
-  if (i >= 18) return cell.room[i - 18];
-  CornerCut& side = cell.surface[i / 3];
-  return i % 3 == 0 ? side.cut : i % 3 == 1 ? side.below : side.above;
+  if (i >= kRooms) return cell.room[i - kRooms];
+  CornerCut& side = cell.surface[i >= kCells ? (i - kCells) / 2 : i / 4];
+  if (i >= kCells) return i % 2 == 0 ? side.below.cell : side.above.cell;
+  return i % 4 == 0 ? side.direction : i % 4 == 1 ? side.offset : i % 4 == 2 ? side.below.bits : side.above.bits;
+}
+/// What it stays below.
+int corner_limit(std::size_t i) {
+  if (i >= kCells && i < kRooms) return CornerSet::kCells;
+  return i < kCells && i % 4 == 0 ? CornerCut::kDirectionsOfPlanes : 256;
 }
 
 /// Directions are stored as they are, all else divided by the grid's scale.
@@ -97,12 +101,12 @@ ExrPart part_of(const Grid& grid, std::size_t k, float scale) {
   return part;
 }
 
-ExrPart corners_of(const Grid& grid, const CornerPart& what) {
+ExrPart corners_of(const Grid& grid, std::size_t which) {
   const auto [x, y, z] = grid.lattice.cells();
-  ExrPart part{.name = what.name, .width = x, .height = y * z, .channels = what.channels};
+  ExrPart part{.name = kCornerParts[which], .width = x, .height = y * z, .channels = int{kCornerChannels}};
   for (CellCorners cell : grid.cells) {
-    for (int c = 0; c < what.channels; ++c)
-      part.pixels.push_back(corner_byte(cell, what.first + static_cast<std::size_t>(c)));
+    for (std::size_t c = 0; c < kCornerChannels; ++c)
+      part.pixels.push_back(corner_byte(cell, kCornerChannels * which + c));
   }
   return part;
 }
@@ -138,18 +142,17 @@ Result<std::vector<CellCorners>> read_corners(const std::vector<ExrPart>& parts,
   const bool any = std::any_of(parts.begin(), parts.end(), [](auto& p) { return p.name.rfind("corners.", 0) == 0; });
   if (!any) return std::vector<CellCorners>{};
   std::vector<CellCorners> cells(lattice.cell_count());
-  for (const CornerPart& what : kCornerParts) {
-    const ExrPart* part = find_part(parts, what.name, x, y * z, what.channels);
-    if (!part)
-      return fault("grid_invalid", std::string("Part ") + what.name + " is missing or has another size.", name);
+  for (std::size_t which = 0; which < kCornerParts.size(); ++which) {
+    const std::string what = std::string("Part ") + kCornerParts[which];
+    const ExrPart* part = find_part(parts, kCornerParts[which], x, y * z, int{kCornerChannels});
+    if (!part) return fault("grid_invalid", what + " is missing or has another size.", name);
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      for (std::size_t c = 0; c < static_cast<std::size_t>(what.channels); ++c) {
+      for (std::size_t c = 0; c < kCornerChannels; ++c) {
         const float value = part->pixels[i * static_cast<std::size_t>(part->channels) + c];
-        if (!(value >= 0 && value <= 255) || value != std::floor(value))
-          return fault("grid_invalid", std::string("Part ") + what.name + " must hold whole numbers up to 255.", name);
-        if (what.channels == 3 && c == 0 && value >= 192)
-          return fault("grid_invalid", std::string("Part ") + what.name + " cuts along a fourth axis.", name);
-        corner_byte(cells[i], what.first + c) = static_cast<std::uint8_t>(value);
+        const int limit = corner_limit(kCornerChannels * which + c);
+        if (!(value >= 0 && value < static_cast<float>(limit)) || value != std::floor(value))
+          return fault("grid_invalid", what + " must hold whole numbers below " + std::to_string(limit) + ".", name);
+        corner_byte(cells[i], kCornerChannels * which + c) = static_cast<std::uint8_t>(value);
       }
     }
   }
@@ -173,9 +176,7 @@ Bytes write_grid_exr(const Grid& grid, const Frame& frame, const std::string& pr
   const float scale = scale_of(grid);
   std::vector<ExrPart> parts;
   for (std::size_t k = 0; k < grid.parts.size(); ++k) parts.push_back(part_of(grid, k, scale));
-  for (const CornerPart& what : kCornerParts) {
-    if (!grid.cells.empty()) parts.push_back(corners_of(grid, what));
-  }
+  for (std::size_t k = 0; k < kCornerParts.size() && !grid.cells.empty(); ++k) parts.push_back(corners_of(grid, k));
   const auto& [x, y, z] = grid.lattice.size;
   parts[0].text = {
       {"kiln.grid", kVersion},
@@ -198,7 +199,7 @@ Result<Grid> read_grid_exr(std::span<const std::uint8_t> file, const std::string
   const std::string blend = word_of(first, "kiln.blend"), content = word_of(first, "kiln.content");
   if (word_of(first, "kiln.grid") != kVersion || (blend != "exact" && blend != "paper") ||
       (content != "indirect" && content != "all"))
-    return fault("grid_invalid", "The first part must have kiln.grid 1, kiln.blend and kiln.content.", name);
+    return fault("grid_invalid", "The first part must have kiln.grid 2, kiln.blend and kiln.content.", name);
   const auto scale = numbers_of<1>(first, "kiln.scale");
   if (!scale || !((*scale)[0] > 0)) return fault("grid_invalid", "kiln.scale must be a positive number.", name);
   KILN_TRY(lattice, lattice_of(first, name));

@@ -6,10 +6,11 @@
 
 #include "core/artifact/grid_exr.h"
 #include "core/bake/radiosity_step.h"
-#include "core/bake/surface_samples.h"
+#include "core/grid/surface_gather.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 #include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 
 namespace kiln {
 namespace {
@@ -99,21 +100,31 @@ double seconds_a_ray(const Tracer& tracer, const GridBake& bake, Threads& thread
   return kReading * seconds / std::max(1.0, sent);
 }
 
-/// Shadow rays of cell_corners.h: sixteen points to a cell's face and one a triangle ask for eight corners each; of the
-/// cells a surface crosses each asks for 64. A room has about twice the walls of its box.
-double corner_rays(const Prediction& mesh, const GridBake& bake) {
+/// Faces of cells along the surface: a room has about twice the walls of its box.
+double faces_of(const GridBake& bake) {
   const auto& [x, y, z] = bake.size;
-  const double faces = 4.0 * (double(x) * y + double(y) * z + double(z) * x);
-  return 8 * (16 * faces + static_cast<double>(mesh.triangles)) + 64 * faces;
+  return 4.0 * (double(x) * y + double(y) * z + double(z) * x);
+}
+
+/// Places that the grid is fitted to.
+double places_of(const GridBake& bake) { return fits_surface(bake) ? SurfacePlaces{}.per_face * faces_of(bake) : 0; }
+
+/// Rays from the surface. Shadow rays of cell_corners.h: 16 points to a cell's face, 128 along edges, and one a
+/// triangle ask for eight corners each; of the cells a surface crosses each asks for 64. Then those of the places.
+double surface_rays(const Prediction& mesh, const GridBake& bake) {
+  const auto& [x, y, z] = bake.size;
+  const double faces = faces_of(bake), edges = 16.0 * (double(x) + y + z);
+  const double votes = 16 * faces + 128 * edges + static_cast<double>(mesh.triangles);
+  return 8 * votes + 64 * faces + places_of(bake) * bake.rays / 2;
 }
 
 /// Adds a grid of one size to a prediction. Bytes and memory by vertices, as measured by grid_bake_test.
 void add_prediction(Prediction& out, const GridBake& bake, double price) {
   const double vertices = vertices_of(bake.size), numbers = 3 * static_cast<double>(part_count(bake.blend));
   const double rays = vertices * bake.rays;
-  out.rays += whole(rays + corner_rays(out, bake));
-  out.seconds += price * (rays + corner_rays(out, bake)) + 2e-6 * vertices;
-  out.memory_bytes += whole(vertices * (16 * numbers + 64));
+  out.rays += whole(rays + surface_rays(out, bake));
+  out.seconds += price * (rays + surface_rays(out, bake)) + 2e-6 * vertices;
+  out.memory_bytes += whole(vertices * (16 * numbers + 64) + 220 * places_of(bake));
   out.artifact_bytes += whole(6000 + vertices * (1.75 * numbers + 2));
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/base/expects.h"
 #include "core/grid/cell_corners.h"
+#include "core/grid/surface_fit.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
 
@@ -136,6 +137,10 @@ BakedGrid bake_grid(const SphereGather::World& world, const GridBake& params, Th
   }
   out.stats.rays = rays;
   if (params.corners) grid.cells = find_cell_corners(world.tracer, grid.lattice, places, out.stats.rays, threads);
+  if (fits_surface(params)) {
+    const SurfacePlaces surface{.rays = params.rays / 2, .seed = params.seed};
+    fit_to_surface(gather_surface(world, surface, grid, places, out.stats.rays, threads), grid, threads);
+  }
   return out;
 }
 

@@ -7,6 +7,9 @@
 // gets
 //          the mean of its valid neighbours, then theirs; corners that count never name it, readers without them do.
 // Corners  core/grid/cell_corners.h
+// Fit      Reflected light in the exact blend is fitted to what places of the surface receive, by half as many rays
+// each
+//          (core/grid/surface_fit.h). Lamps' own light falls off within a cell: there what stands in the open counts.
 // Paper    Pacanowski et al. 2006, section 3.   Differs  blend and corners (irradiance_vectors.h, grid.h)
 // Cost     rays x vertices closest hits, and a read of a table for each
 // Error    see README.md.   Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if
@@ -31,6 +34,11 @@ struct GridBake {
   std::function<void(std::uint64_t done, std::uint64_t total)> progress =
       {};  // vertices; from any thread, one call at a time
 };
+
+/// Whether a bake with these parameters is fitted to the surface.
+inline bool fits_surface(const GridBake& params) {
+  return params.corners && params.blend == GridBlend::exact && params.content == GridContent::indirect;
+}
 
 struct GridStats {
   std::uint64_t rays = 0;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/base/random.h"
+#include "core/grid/corner_votes.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/points.h"
 #include "core/sphere/sampling.h"
@@ -15,121 +16,160 @@
 namespace kiln {
 namespace {
 
-constexpr double kPerCell = 16;                  // points to the area of a cell's smallest face
+constexpr double kPerCell = 16, kPerBusy = 128;  // points to the area of a cell's smallest face
 constexpr std::uint64_t kMostPoints = 1U << 16;  // on one triangle
 constexpr std::size_t kBlock = 256;
-constexpr int kOpenWeight = 8;  // of places in the open: where they share a cell with the inside of a solid, which
-                                // nobody sees, its darkness must not reach out from under it
 
-/// One point of a surface: which corners its side sees.
-struct Vote {
-  std::uint64_t key = 0;  // cell x 6 + direction
-  std::uint8_t seen = 0;
-  int weight = 1;
-  std::array<double, 3> fraction{};  // its place in the cell
-};
-using Votes = std::span<const Vote>;
+using Votes = std::span<const CornerVote>;
 
-double smallest_face(const Lattice& lattice) {
-  const Vec3d& s = lattice.spacing;
-  return std::min({s.x * s.y, s.y * s.z, s.z * s.x});
-}
-
-std::uint64_t points_on(double area, double face) {
-  return static_cast<std::uint64_t>(std::clamp(std::ceil(kPerCell * area / face), 1.0, double{kMostPoints}));
+std::uint64_t points_on(double faces, double per_face) {
+  return static_cast<std::uint64_t>(std::clamp(std::ceil(per_face * faces), 1.0, double{kMostPoints}));
 }
 
 class Voters {
  public:
   Voters(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands)
-      : tracer_(tracer), lattice_(lattice), stands_(stands), faces_(tracer.scene()), face_(smallest_face(lattice)) {}
+      : tracer_(tracer), lattice_(lattice), stands_(stands), face_(smallest_face(lattice)) {}
 
-  void add_votes_of(std::uint32_t triangle, std::vector<Vote>& votes) const {
-    const Scene& scene = tracer_.scene();
-    const std::uint64_t count = points_on(triangle_area(scene.mesh, scene.mesh.triangles[triangle]), face_);
-    const Part& part = scene.parts[scene.mesh.part[triangle]];
-    const bool both = scene.materials[static_cast<std::size_t>(part.material)].double_sided;
-    for (std::uint64_t i = 0; i < count; ++i) {
-      const Vec2f u = sobol_owen(static_cast<std::uint32_t>(i), mix64(triangle));
-      const Vec2<double> at = uniform_triangle({u.x, u.y});
-      const SurfacePoint p = surface_point(scene, triangle, static_cast<float>(at.x), static_cast<float>(at.y));
-      votes.push_back(vote(p.position, p.normal, p.geometric_normal));
-      if (both) votes.push_back(vote(p.position, -p.normal, -p.geometric_normal));
+  void add_votes_of(std::uint32_t triangle, std::vector<CornerVote>& votes) const {
+    const std::uint64_t count = points_on(faces_of(triangle), kPerCell);
+    for (std::uint64_t i = 0; i < count; ++i) add_at(point_of(triangle, i), votes);
+  }
+  /// Those that kPerBusy has more, where they lie in busy cells.
+  void add_more_of(std::uint32_t triangle, const std::vector<bool>& busy, std::vector<CornerVote>& votes) const {
+    const double faces = faces_of(triangle);
+    for (std::uint64_t i = points_on(faces, kPerCell); i < points_on(faces, kPerBusy); ++i) {
+      const SurfacePoint p = point_of(triangle, i);
+      if (busy[lattice_.cell_index(place_in(lattice_, to_double(p.position)).cell)]) add_at(p, votes);
     }
   }
 
  private:
-  Vote vote(const Vec3f& position, const Vec3f& normal, const Vec3f& face) const {
+  double faces_of(std::uint32_t triangle) const {
+    const Mesh& mesh = tracer_.scene().mesh;
+    return triangle_area(mesh, mesh.triangles[triangle]) / face_;
+  }
+  SurfacePoint point_of(std::uint32_t triangle, std::uint64_t i) const {
+    const Vec2f u = sobol_owen(static_cast<std::uint32_t>(i), mix64(triangle));
+    const Vec2<double> at = uniform_triangle({u.x, u.y});
+    return surface_point(tracer_.scene(), triangle, static_cast<float>(at.x), static_cast<float>(at.y));
+  }
+  void add_at(const SurfacePoint& p, std::vector<CornerVote>& votes) const {
+    const Scene& scene = tracer_.scene();
+    const Part& part = scene.parts[scene.mesh.part[p.triangle]];
+    votes.push_back(vote(p.position, p.normal, p.geometric_normal));
+    if (scene.materials[static_cast<std::size_t>(part.material)].double_sided)
+      votes.push_back(vote(p.position, -p.normal, -p.geometric_normal));
+  }
+  CornerVote vote(const Vec3f& position, const Vec3f& normal, const Vec3f& face) const {
     const CellPlace place = place_in(lattice_, to_double(position));
-    const std::uint8_t seen = corners_seen(tracer_, lattice_, stands_, place, offset_origin(position, face));
-    const bool enclosed = is_enclosed(tracer_, faces_, {position, normal, position, face});
+    const Vec3f origin = offset_origin(position, face);
+    const std::uint8_t seen = corners_seen(tracer_, lattice_, stands_, place, origin);
     return {.key = lattice_.cell_index(place.cell) * kDirections + nearest_direction(normal),
             .seen = seen,
-            .weight = enclosed ? 1 : kOpenWeight,
-            .fraction = place.fraction};
+            .fraction = place.fraction,
+            .origin = origin};
   }
 
   const Tracer& tracer_;
   const Lattice& lattice_;
   const std::vector<Vec3f>& stands_;
-  GatherFaces faces_;
   double face_;
 };
 
-std::vector<Vote> surface_votes(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands,
-                                Threads& threads) {
+/// What `add` brings of each triangle, in their order.
+template <class F>
+void add_votes(std::size_t triangles, Threads& threads, std::vector<CornerVote>& votes, const F& add) {
+  std::vector<std::vector<CornerVote>> found((triangles + kBlock - 1) / kBlock);
+  threads.for_blocks(triangles, kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) add(static_cast<std::uint32_t>(t), found[begin / kBlock]);
+  });
+  for (const auto& own : found) votes.insert(votes.end(), own.begin(), own.end());
+}
+
+/// Cells in which places differ, or lie along two axes: there an edge may part them.
+std::vector<bool> busy_cells(const Lattice& lattice, Votes votes) {
+  struct Seen {
+    std::array<std::int16_t, kDirections> bits;
+  };
+  constexpr std::int16_t kNone = -1, kDiffer = -2;
+  Seen none{};
+  none.bits.fill(kNone);
+  std::vector<Seen> cells(lattice.cell_count(), none);
+  for (const CornerVote& v : votes) {
+    std::int16_t& bits = cells[v.key / kDirections].bits[v.key % kDirections];
+    bits = bits == kNone || bits == v.seen ? v.seen : kDiffer;
+  }
+  std::vector<bool> busy;
+  for (const Seen& cell : cells) {
+    int axes = 0;
+    for (std::size_t a = 0; a < 3; ++a) axes += cell.bits[2 * a] != kNone || cell.bits[2 * a + 1] != kNone ? 1 : 0;
+    busy.push_back(axes > 1 || std::find(cell.bits.begin(), cell.bits.end(), kDiffer) != cell.bits.end());
+  }
+  return busy;
+}
+
+std::vector<CornerVote> surface_votes(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands,
+                                      Threads& threads) {
   const Voters voters(tracer, lattice, stands);
   const std::size_t triangles = tracer.scene().mesh.triangles.size();
-  std::vector<std::vector<Vote>> found((triangles + kBlock - 1) / kBlock);
-  threads.for_blocks(triangles, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) voters.add_votes_of(static_cast<std::uint32_t>(t), found[begin / kBlock]);
-  });
-  std::vector<Vote> votes;
-  for (const auto& own : found) votes.insert(votes.end(), own.begin(), own.end());
-  std::stable_sort(votes.begin(), votes.end(), [](const Vote& a, const Vote& b) { return a.key < b.key; });
+  std::vector<CornerVote> votes;
+  add_votes(triangles, threads, votes, [&](std::uint32_t t, auto& out) { voters.add_votes_of(t, out); });
+  const std::vector<bool> busy = busy_cells(lattice, votes);
+  add_votes(triangles, threads, votes, [&](std::uint32_t t, auto& out) { voters.add_more_of(t, busy, out); });
+  std::stable_sort(votes.begin(), votes.end(), [](const CornerVote& a, const CornerVote& b) { return a.key < b.key; });
   return votes;
 }
 
-constexpr int kCuts = 15;  // planes tried along each axis
+/// Of a place from a vertex, in spacings; at least a hair.
+double squared_distance(const Lattice& lattice, const CornerVote& v, const std::array<int, 3>& vertex) {
+  const std::array<int, 3> cell = lattice.cell(v.key / kDirections);
+  double sum = 1e-6;
+  for (std::size_t axis = 0; axis < 3; ++axis) sum += std::pow(cell[axis] + v.fraction[axis] - vertex[axis], 2);
+  return sum;
+}
 
-/// How many votes see each corner.
-struct Tally {
-  std::array<int, 8> seen{};
-  int votes = 0;
-
-  void add(const Vote& v) {
-    votes += v.weight;
-    for (std::size_t k = 0; k < 8; ++k) seen[k] += (v.seen >> k & 1) * v.weight;
-  }
-  /// The corners that at least half of the votes see.
-  std::uint8_t majority() const {
-    unsigned bits = 0;
-    for (std::size_t k = 0; k < 8; ++k) bits |= 2 * seen[k] >= votes && votes > 0 ? 1U << k : 0U;
-    return static_cast<std::uint8_t>(bits);
-  }
-  int outvoted() const {
-    int sum = 0;
-    for (const int n : seen) sum += std::min(n, votes - n);
-    return sum;
-  }
-};
-
-CornerCut best_cut(Votes votes) {
-  Tally all;
-  for (const Vote& v : votes) all.add(v);
-  CornerCut best{0, all.majority(), 0};
-  int least = all.outvoted();
-  for (std::size_t axis = 0; axis < 3 && least > 0; ++axis) {
-    for (int k = 1; k <= kCuts; ++k) {
-      const int place = 64 * k / (kCuts + 1);
-      Tally below, above;
-      for (const Vote& v : votes) (v.fraction[axis] >= place / 64.0 ? above : below).add(v);
-      if (below.votes == 0 || above.votes == 0 || below.outvoted() + above.outvoted() >= least) continue;
-      least = below.outvoted() + above.outvoted();
-      best = {static_cast<std::uint8_t>(axis << 6 | static_cast<unsigned>(place)), below.majority(), above.majority()};
+/// For places that see no corner of their cell, as in slivers between a wall and the next vertices: the neighbour of
+/// which they see the most, nearer corners before others. Asks a few of the places.
+CornerSet neighbour_seen(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands, Votes votes,
+                         std::uint64_t& rays) {
+  constexpr std::size_t kAsked = 4;
+  const std::size_t asked = std::min(kAsked, votes.size());
+  CornerSet best;
+  double most = 0;
+  for (std::uint8_t cell = 0; cell < CornerSet::kCells; ++cell) {
+    double score = 0;
+    std::array<std::size_t, 8> seen{};
+    for (std::size_t i = 0; i < asked; ++i) {
+      const CornerVote& v = votes[i * votes.size() / asked];
+      const auto moved = moved_into(lattice, {lattice.cell(v.key / kDirections), v.fraction}, cell);
+      if (cell == CornerSet::kOwnCell || !moved) break;
+      const std::uint8_t bits = corners_seen(tracer, lattice, stands, *moved, v.origin);
+      rays += 8;
+      for (std::size_t k = 0; k < 8; ++k) {
+        if ((bits >> k & 1) == 0) continue;
+        ++seen[k];
+        score += 1 / squared_distance(lattice, v, lattice.corner(moved->cell, static_cast<int>(k)));
+      }
     }
+    unsigned bits = 0;
+    for (std::size_t k = 0; k < 8; ++k) bits |= seen[k] > 0 && 2 * seen[k] >= asked ? 1U << k : 0U;
+    if (bits != 0 && score > most) most = score, best = {cell, static_cast<std::uint8_t>(bits)};
   }
   return best;
+}
+
+/// Sides of a cut of which no corner is seen look into a neighbour.
+void look_beyond(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands, Votes votes,
+                 CornerCut& cut, std::uint64_t& rays) {
+  for (CornerSet* side : {&cut.below, &cut.above}) {
+    if (side->bits != 0 || (side == &cut.above && cut.offset == 0)) continue;
+    std::vector<CornerVote> own;
+    for (const CornerVote& v : votes) {
+      if (&cut.at(v.fraction) == side) own.push_back(v);
+    }
+    *side = neighbour_seen(tracer, lattice, stands, own, rays);
+  }
 }
 
 /// Whether the plane of a triangle passes through a box, or within half a box of it.
@@ -200,19 +240,22 @@ std::vector<CellCorners> find_cell_corners(const Tracer& tracer, const Lattice& 
       asked += 64;
     }
   });
-  const std::vector<Vote> votes = surface_votes(tracer, lattice, stands, threads);
+  const std::vector<CornerVote> votes = surface_votes(tracer, lattice, stands, threads);
   std::vector<Votes> groups;
   for (std::size_t first = 0, last = 0; first < votes.size(); first = last) {
     while (last < votes.size() && votes[last].key == votes[first].key) ++last;
     groups.push_back(Votes(votes).subspan(first, last - first));
   }
   threads.for_blocks(groups.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::uint64_t own = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint64_t key = groups[i].front().key;
-      cells[key / kDirections].surface[key % kDirections] = best_cut(groups[i]);
+      CornerCut& cut = cells[key / kDirections].surface[key % kDirections] = best_cut(groups[i]);
+      look_beyond(tracer, lattice, stands, groups[i], cut, own);
     }
+    asked += own;
   });
-  rays += asked + 9 * votes.size();
+  rays += asked + 8 * votes.size();
   return cells;
 }
 

@@ -1,16 +1,16 @@
 #pragma once
 // Which corners of its cell a place may look at, found once with shadow rays so that a viewer needs none.
 //
-// Surfaces  Points are spread over every triangle (kPerCell to a cell's face, at least one), on the sides that show;
-// each
-//           asks for the corners it sees, and its normal says which of six directions it votes for. A corner counts for
-//           a direction where at least half of the votes see it. Votes that differ are first parted by the cut, of 3 x
-//           kCuts, that leaves the fewest of them outvoted.
+// Surfaces  Points are spread over every triangle (kPerCell to a cell's face, kPerBusy in cells where they differ or
+// lie
+//           along two axes, at least one), on the sides that show. Each asks for the corners it sees, and its normal
+//           says which of six directions it votes for (corner_votes.h).
+// Slivers   Places that see no corner of their cell, between a wall and the vertices beyond it, look into the neighbour
+//           of which they see the most.
 // Rooms     In cells that a triangle passes through, the middle of each eighth asks. All corners count elsewhere.
-// Beats     plane tests and moving the look-up (shared notes, measured); a ray for every look-up is the truth it is
-//           tested against.
-// Cost      9 rays for each point; 64 for each cell that a surface passes through.   Repeat  same bits for any thread
-// count
+// Beats     plane tests (shared notes, measured); a ray for every look-up is the truth it is tested against.
+// Cost      8 rays for each point; 64 for each cell that a surface passes through
+// Repeat    same bits for any thread count
 
 #include <vector>
 

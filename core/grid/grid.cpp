@@ -21,38 +21,31 @@ struct Stencil {
   }
 };
 
-std::uint8_t corners_that_count(const Grid& grid, const CellPlace& place, const Vec3f& n, GridPlace kind) {
-  constexpr std::uint8_t kAll = 0xff;
-  if (grid.cells.empty() || kind == GridPlace::anywhere) return kAll;
-  const CellCorners& cell = grid.cells[grid.lattice.cell_index(place.cell)];
-  std::uint8_t bits = 0;
-  if (kind == GridPlace::surface) bits = cell.surface[nearest_direction(n)].at(place.fraction);
-  if (bits == 0) {
-    const auto& f = place.fraction;
-    bits = cell.room[(f[0] < 0.5 ? 0U : 1U) | (f[1] < 0.5 ? 0U : 2U) | (f[2] < 0.5 ? 0U : 4U)];
-  }
-  return bits == 0 ? kAll : bits;
-}
-
 /// Corners that do not count leave their weight to the others; a little of it is everyone's, so that there is some.
-Stencil linear_stencil(const Lattice& lattice, const CellPlace& place, std::uint8_t bits) {
-  constexpr double kLeast = 1e-4;
+std::array<double, 8> linear_weights(const CornersRead& at) {
+  constexpr double kLeast = 1e-3;
+  const double least = at.bits == 0xff ? 0 : kLeast;
   std::array<double, 8> weight{};
   double sum = 0;
-  for (int k = 0; k < 8; ++k) {
-    if ((bits >> k & 1) == 0) continue;
-    double w = 1;
+  for (std::size_t k = 0; k < 8; ++k) {
+    if ((at.bits >> k & 1) == 0) continue;
+    weight[k] = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double f = place.fraction[axis];
-      w *= (k >> axis & 1) != 0 ? f : 1 - f;
+      const double f = at.place.fraction[axis];
+      weight[k] *= ((k >> axis & 1) != 0 ? f : 1 - f) + least;
     }
-    weight[static_cast<std::size_t>(k)] = bits == 0xff ? w : w + kLeast;
-    sum += weight[static_cast<std::size_t>(k)];
+    sum += weight[k];
   }
+  for (double& w : weight) w /= sum;
+  return weight;
+}
+
+Stencil linear_stencil(const Lattice& lattice, const CornersRead& at) {
+  const std::array<double, 8> weight = linear_weights(at);
   Stencil out;
   for (int k = 0; k < 8; ++k) {
-    const double w = weight[static_cast<std::size_t>(k)] / sum;
-    if (w > 0) out.add(lattice.index(lattice.corner(place.cell, k)), w);
+    const double w = weight[static_cast<std::size_t>(k)];
+    if (w > 0) out.add(lattice.index(lattice.corner(at.place.cell, k)), w);
   }
   return out;
 }
@@ -92,11 +85,45 @@ std::size_t nearest_direction(const Vec3f& n) {
   return direction_on(x >= y && x >= z ? 0 : y >= z ? 1 : 2, n);
 }
 
-Vec3f irradiance_at(const Grid& grid, const Vec3d& position, const Vec3f& n, GridPlace kind, GridFilter filter) {
+std::optional<CellPlace> moved_into(const Lattice& lattice, const CellPlace& place, std::uint8_t cell) {
+  const std::array<int, 3> step{cell % 3 - 1, cell / 3 % 3 - 1, cell / 9 - 1}, cells = lattice.cells();
+  CellPlace out = place;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    out.cell[axis] += step[axis];
+    out.fraction[axis] = std::clamp(place.fraction[axis] - step[axis], 0.0, 1.0);
+    if (out.cell[axis] < 0 || out.cell[axis] >= cells[axis]) return std::nullopt;
+  }
+  return out;
+}
+
+CornersRead corners_read(const Grid& grid, const Vec3d& position, const Vec3f& n, GridPlace kind) {
   const CellPlace place = place_in(grid.lattice, position);
-  const std::uint8_t bits = corners_that_count(grid, place, n, kind);
-  const Stencil stencil = filter == GridFilter::cubic && bits == 0xff ? cubic_stencil(grid.lattice, place)
-                                                                      : linear_stencil(grid.lattice, place, bits);
+  if (grid.cells.empty() || kind == GridPlace::anywhere) return {place};
+  const CellCorners& cell = grid.cells[grid.lattice.cell_index(place.cell)];
+  if (kind == GridPlace::surface) {
+    const CornerSet& set = cell.surface[nearest_direction(n)].at(place.fraction);
+    const auto moved = moved_into(grid.lattice, place, set.cell);
+    if (set.bits != 0 && moved) return {*moved, set.bits};
+  }
+  const auto& f = place.fraction;
+  const std::uint8_t bits = cell.room[(f[0] < 0.5 ? 0U : 1U) | (f[1] < 0.5 ? 0U : 2U) | (f[2] < 0.5 ? 0U : 4U)];
+  return {place, bits == 0 ? std::uint8_t{0xff} : bits};
+}
+
+LinearRead linear_read(const Lattice& lattice, const CornersRead& at) {
+  const std::array<double, 8> weight = linear_weights(at);
+  LinearRead out;
+  for (std::size_t k = 0; k < 8; ++k) {
+    out.vertex[k] = static_cast<std::uint32_t>(lattice.index(lattice.corner(at.place.cell, static_cast<int>(k))));
+    out.weight[k] = static_cast<float>(weight[k]);
+  }
+  return out;
+}
+
+Vec3f irradiance_at(const Grid& grid, const Vec3d& position, const Vec3f& n, GridPlace kind, GridFilter filter) {
+  const CornersRead at = corners_read(grid, position, n, kind);
+  const Stencil stencil = filter == GridFilter::cubic && at.bits == 0xff ? cubic_stencil(grid.lattice, at.place)
+                                                                         : linear_stencil(grid.lattice, at);
   if (grid.blend == GridBlend::paper) return texel_irradiance(read_parts<kPaperParts>(grid, stencil), n);
   return exact_irradiance(read_parts<kExactParts>(grid, stencil), n);
 }

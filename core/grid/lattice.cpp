@@ -19,6 +19,11 @@ CellPlace place_in(const Lattice& lattice, const Vec3d& position) {
   return place;
 }
 
+double smallest_face(const Lattice& lattice) {
+  const Vec3d& s = lattice.spacing;
+  return std::min({s.x * s.y, s.y * s.z, s.z * s.x});
+}
+
 Lattice lattice_over(const Vec3d& low, const Vec3d& high, const std::array<int, 3>& size) {
   const Vec3d extent = high - low;
   const double longest = longest_side(extent);

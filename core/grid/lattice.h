@@ -64,6 +64,9 @@ struct CellPlace {
 };
 CellPlace place_in(const Lattice&, const Vec3d& position);
 
+/// The area of the smallest face of a cell.
+double smallest_face(const Lattice&);
+
 /// The lattice of `size` over a box. An axis without extent gets a spacing of the longest axis's.
 Lattice lattice_over(const Vec3d& low, const Vec3d& high, const std::array<int, 3>& size);
 

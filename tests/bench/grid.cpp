@@ -1,5 +1,7 @@
 // Irradiance vector grids of the reference scene against its indirect light (comb - dir), and the rate of gathering.
 //   kiln_grid_bench [longest side] [rays]      default: 8, 16, 32, 64 with 512 rays
+//   kiln_grid_bench rate                       gathering at 64 along the longest side against Embree alone, in
+//                                              processor seconds: Cornell and the dungeon
 // One JSON line a case: relRMSE at the vertices by blend, corners and filter; seconds; rays; bytes.
 
 #include <chrono>
@@ -10,7 +12,10 @@
 
 #include "core/grid/bake_grid.h"
 #include "core/grid/cell_corners.h"
+#include "core/grid/surface_gather.h"
 #include "core/meshless/radiosity.h"
+#include "core/sphere/sampling.h"
+#include "tests/bench/bench.h"
 #include "tests/core/prt/reference_set.h"
 
 namespace kiln::bench {
@@ -51,6 +56,29 @@ void report(const Case& c, const std::string& what, const std::string& more, con
   std::fflush(stdout);
 }
 
+/// Receivers in the open, of any direction, against rays of their own.
+void run_open(const Case& c, const LitSurface& surface, const std::string& what, const Grid& grid) {
+  const SurfaceGather gather({c.tracer, surface.faces(), &surface, nullptr}, 1024, 5);
+  const Box box = box_of(c.tracer.scene().mesh);
+  std::uint64_t rays = 0;
+  std::vector<Vec3f> values, truth;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    Random random(6, i);
+    Vec3d p;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      p[axis] = box.low[axis] + (box.high[axis] - box.low[axis]) * random.uniform_double();
+    const double x = random.uniform_double(), y = random.uniform_double();
+    const Vec3f n = to_float(uniform_sphere(Vec2<double>{x, y}));
+    truth.push_back(gather.at({to_float(p), n}, i, rays) * std::numbers::inv_pi_v<float>);
+    values.push_back(irradiance_at(grid, p, n, GridPlace::room) * std::numbers::inv_pi_v<float>);
+  }
+  const testing::RelativeError error = testing::relative_error(values, truth);
+  std::printf(
+      "{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"%s, receivers in the open\",\"relrmse\":%.5f,"
+      "\"without_worst_1pct\":%.5f}\n",
+      c.name, what.c_str(), error.all, error.without_worst);
+}
+
 void run(const Case& c, const LitSurface& surface, int longest, int rays, Threads& threads) {
   const Box box = box_of(c.tracer.scene().mesh);
   for (const GridBlend blend : {GridBlend::exact, GridBlend::paper}) {
@@ -68,6 +96,7 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
     const std::string name = blend == GridBlend::exact ? "exact" : "paper texels";
     report(c, name + ", stored corners", more,
            [&](const Vec3f& p, const Vec3f& n) { return irradiance_at(grid, to_double(p), n); });
+    run_open(c, surface, name, grid);
     if (blend == GridBlend::paper) continue;
     report(c, name + ", stored corners, cubic", "", [&](const Vec3f& p, const Vec3f& n) {
       return irradiance_at(grid, to_double(p), n, GridPlace::surface, GridFilter::cubic);
@@ -81,7 +110,7 @@ void run(const Case& c, const LitSurface& surface, int longest, int rays, Thread
     report(c, name + ", a ray to each corner", "", [&](const Vec3f& p, const Vec3f& n) {
       const CellPlace place = place_in(grid.lattice, to_double(p));
       const std::uint8_t bits = corners_seen(c.tracer, grid.lattice, stands, place, offset_origin(p, n));
-      own.cells[grid.lattice.cell_index(place.cell)].surface.fill({0, bits, 0});
+      own.cells[grid.lattice.cell_index(place.cell)].surface.fill({.below = {.bits = bits}});
       return irradiance_at(own, to_double(p), n);
     });
   }
@@ -102,12 +131,13 @@ void run_floor(const Case& c, const LitSurface& surface, int rays) {
 }
 
 /// Rays of a vertex alone, without looking at what they hit: what Embree could do at most.
-void run_rate(const Case& c, const LitSurface& surface, int longest, int rays, Threads& threads) {
-  const Box box = box_of(c.tracer.scene().mesh);
+void run_rate(const char* name, const Tracer& tracer, const LitSurface& surface, int longest, int rays,
+              Threads& threads) {
+  const Box box = box_of(tracer.scene().mesh);
   const Lattice lattice = lattice_over(box.low, box.high, even_size(box.low, box.high, longest));
-  const std::vector<Vec3f> places = gather_places(lattice, c.tracer.scene(), threads);
+  const std::vector<Vec3f> places = gather_places(lattice, tracer.scene(), threads);
   const DirectionSets sets(0, rays, 8, 1, 0, Spread::sphere);
-  const auto start = Clock::now();
+  const double start = process_seconds();
   std::atomic<std::uint64_t> hits_found = 0;
   threads.for_blocks(places.size(), 32, [&](std::size_t begin, std::size_t end) {
     Rays16 packet;
@@ -119,21 +149,32 @@ void run_rate(const Case& c, const LitSurface& surface, int longest, int rays, T
       const LocalFrame frame = local_frame(sets, {0, 1, 0}, 1, v);
       for (int k = 0; k < sets.samples() / kPacket; ++k) {
         sets.turn(frame.set, k, frame.basis, packet);
-        c.tracer.closest16(packet, hits);
+        tracer.closest16(packet, hits);
         for (const std::uint32_t t : hits.triangle) found += t != kNoHit ? 1 : 0;
       }
     }
     hits_found += found;
   });
-  const double bare = 1e-6 * static_cast<double>(places.size()) * sets.samples() / since(start);
-  const auto again = Clock::now();
-  const BakedGrid baked = bake_grid({c.tracer, surface.faces(), &surface, nullptr},
+  const double bare = 1e-6 * static_cast<double>(places.size()) * sets.samples() / (process_seconds() - start);
+  const double again = process_seconds();
+  const BakedGrid baked = bake_grid({tracer, surface.faces(), &surface, nullptr},
                                     {.size = lattice.size, .rays = rays, .corners = false}, threads);
-  const double ours = 1e-6 * static_cast<double>(baked.stats.rays) / since(again);
+  const double ours = 1e-6 * static_cast<double>(baked.stats.rays) / (process_seconds() - again);
   std::printf(
       "{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"longest\":%d,\"rays\":%d,\"embree_mrays_s\":%.2f,"
       "\"bake_mrays_s\":%.2f,\"ratio\":%.3f}\n",
-      c.name, longest, rays, bare, ours, ours / bare);
+      name, longest, rays, bare, ours, ours / bare);
+}
+
+void run_rates(const testing::ReferenceSet& set, Threads& threads) {
+  const auto rate = [&](const char* name, const Scene& scene) {
+    const Tracer tracer(scene, threads);
+    const RadiosityResult light = solve_radiosity(tracer, nullptr, {}, threads);
+    run_rate(name, tracer, *light.surface, 64, 256, threads);
+  };
+  rate("cornell", set.scene);
+  if (const auto dungeon = testing::load_scene(KILN_SHARED, "scenes/dungeon-interior/level-dungeon.gltf"))
+    rate("dungeon", *dungeon);
 }
 
 }  // namespace
@@ -148,6 +189,7 @@ int main(int argc, char** argv) {
   std::vector<Vec3f> truth = set->values("cornell.comb");
   const std::vector<Vec3f> direct = set->values("cornell.dir");
   for (std::size_t i = 0; i < truth.size(); ++i) truth[i] -= direct[i];
+  if (argc > 1 && std::string(argv[1]) == "rate") return run_rates(*set, threads), 0;
   std::vector<int> sides{8, 16, 32, 64};
   if (argc > 1) sides = {std::atoi(argv[1])};
   const int rays = argc > 2 ? std::atoi(argv[2]) : 512;
@@ -160,6 +202,5 @@ int main(int argc, char** argv) {
     const Case c{turned ? "cornell rotated" : "cornell", tracer, *set, truth};
     run_floor(c, *light.surface, rays);
     for (const int side : sides) run(c, *light.surface, side, rays, threads);
-    if (!turned) run_rate(c, *light.surface, sides.back(), rays, threads);
   }
 }

@@ -10,6 +10,8 @@ import { load } from './sources.mjs';
 const bytes = readFileSync(new URL('fixtures/grid.exr', import.meta.url)); // the demo's room at 6 x 5 x 4, with corners
 const { readGrid, irradianceAt } = await load('asset/grid_file.ts');
 const grid = readGrid(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+const lines = readFileSync(new URL('fixtures/grid.csv', import.meta.url), 'utf8').trim().split('\n').slice(1);
+const surface = lines.map((line) => line.split(',').map(Number)); // place, normal, irradiance by `kiln eval`
 const kView = `/view/${jobId('done')}`;
 
 let browser, mock;
@@ -28,7 +30,7 @@ test('the file is read as it was written', () => {
   assert.deepEqual(grid.size, [6, 5, 4]);
   assert.equal(grid.blend, 'exact');
   assert.equal(grid.parts.length, 9);
-  assert.equal(grid.corners.length, 32 * 5 * 4 * 3);
+  assert.equal(grid.corners.length, 48 * 5 * 4 * 3);
   assert.ok(grid.corners.some((b) => b !== 255 && b !== 0));
 });
 
@@ -42,6 +44,14 @@ test('light of a constant grid is the same everywhere and along all normals', ()
     [0.6, 0, 0.8],
   ])
     assert.ok(Math.abs(irradianceAt(even, [0.1, 0.2, 0.3], n, 'room')[0] - 3.140625) < 1e-5);
+});
+
+test('a surface reads what the engine reads of the same file', () => {
+  assert.equal(surface.length, 100);
+  for (const [x, y, z, nx, ny, nz, ...truth] of surface) {
+    const light = irradianceAt(grid, [x, y, z], [nx, ny, nz], 'surface');
+    for (let c = 0; c < 3; ++c) assert.ok(Math.abs(light[c] - truth[c]) < 1e-4, `${light} for ${truth}`); // floats
+  }
 });
 
 const encode = (linear) => (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055);
@@ -72,16 +82,18 @@ const readBall = (page) =>
     };
   });
 
-for (const at of ['0,0,0', '0.5,-0.6,0.3', '-0.9,0.9,-0.9', '0.2,-0.95,-0.4'])
-  test(`the ball at ${at} of the grid is as bright as the file says`, () =>
-    withViewer(`tone=none&ev=1&background=off&ballAt=${at}`, async (page) => {
-      const { colour, place, normal, exposure } = await readBall(page);
-      const light = irradianceAt(grid, place, normal, 'room');
-      const expected = light.map((e) => encode(clamp((exposure * 0.8 * e) / Math.PI)));
-      assert.ok(Math.max(...expected) > 0.05);
-      // A step of 8 bits, half a step of dithering, and what the normal turns within a pixel.
-      for (let c = 0; c < 3; ++c) assert.ok(Math.abs(colour[c] - expected[c]) < 3 / 255, `${colour} for ${expected}`);
-    }));
+for (const place of ['room', 'surface'])
+  for (const at of ['0,0,0', '0.5,-0.6,0.3', '-0.9,0.9,-0.9', '0.2,-0.95,-0.4'])
+    test(`the ball at ${at} of the grid is as bright as the file says of a ${place}`, () =>
+      withViewer(`tone=none&ev=1&background=off&ballAt=${at}`, async (page) => {
+        await page.evaluate((on) => (window.kilnGrid.ball.material.uniforms.surface.value = on), place === 'surface');
+        const { colour, place: p, normal, exposure } = await readBall(page);
+        const light = irradianceAt(grid, p, normal, place);
+        const expected = light.map((e) => encode(clamp((exposure * 0.8 * e) / Math.PI)));
+        assert.ok(Math.max(...expected) > 0.05);
+        // A step of 8 bits, half a step of dithering, and what the normal turns within a pixel.
+        for (let c = 0; c < 3; ++c) assert.ok(Math.abs(colour[c] - expected[c]) < 3 / 255, `${colour} for ${expected}`);
+      }));
 
 test('a drag moves the ball and not the camera, and the address keeps its place', () =>
   withViewer('background=off', async (page) => {

@@ -26,9 +26,12 @@ Grid random_grid(GridBlend blend, const std::array<int, 3>& size, float scale = 
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     Random random(2, i);
     for (auto& bits : grid.cells[i].room) bits = static_cast<std::uint8_t>(random.next());
+    const auto below = [&](int limit) { return static_cast<std::uint8_t>(random.next() % std::uint64_t(limit)); };
     for (CornerCut& side : grid.cells[i].surface) {
-      side = {static_cast<std::uint8_t>(random.next() % 192), static_cast<std::uint8_t>(random.next()),
-              static_cast<std::uint8_t>(random.next())};
+      side = {below(CornerCut::kDirectionsOfPlanes),
+              below(256),
+              {below(CornerSet::kCells), below(256)},
+              {below(CornerSet::kCells), below(256)}};
     }
   }
   return grid;
@@ -73,6 +76,18 @@ TEST(GridExr, LightOfAllSizesIsNeverInfiniteNorSilentlyZero) {
 TEST(GridExr, SameBytesForTheSameGrid) {
   const Grid grid = random_grid(GridBlend::exact, {4, 4, 4});
   EXPECT_EQ(write_grid_exr(grid, kFrame, "{}"), write_grid_exr(grid, kFrame, "{}"));
+}
+
+TEST(GridExr, CornersThatCannotBeAreRefusedWithTheirPart) {
+  const auto fault_of = [](const CornerCut& cut) {
+    Grid grid = random_grid(GridBlend::exact, {3, 2, 2});
+    grid.cells[1].surface[2] = cut;
+    const auto read = read_grid_exr(write_grid_exr(grid, kFrame, "{}"), "grid.exr");
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_EQ(fault_of({242, 255, {26, 255}, {26, 255}}), "");
+  EXPECT_EQ(fault_of({243, 1, {}, {}}), "Part corners.py must hold whole numbers below 243.");
+  EXPECT_EQ(fault_of({0, 1, {27, 1}, {}}), "Part corners.cells.y must hold whole numbers below 27.");
 }
 
 TEST(GridExr, OneVertexIsAGrid) {

@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "core/meshless/radiosity.h"
+#include "core/trace/surface.h"
+#include "core/trace/surface_samples.h"
 #include "tests/core/prt/test_scenes.h"
 
 namespace kiln {
@@ -98,6 +100,26 @@ TEST(BakeGrid, WithoutLightIsExactlyBlack) {
   for (const auto& part : baked.grid.grid.parts) {
     for (const Vec3f& x : part) ASSERT_EQ(x, Vec3f{});
   }
+}
+
+TEST(BakeGrid, InATurnedFurnaceEveryPlaceOfTheSurfaceReadsItsLight) {
+  // Slivers between the turned walls and the next vertices outside have no vertex of their cell inside.
+  Scene scene = furnace(0.5F);
+  const Vec3f x = normalized(Vec3f{2, 1, 0.5F}), y = normalized(cross(Vec3f{0.3F, -1, 2}, x)), z = cross(x, y);
+  for (Vec3f& p : scene.mesh.position) p = (x * p.x + y * p.y + z * p.z) * 0.55F;
+  for (Vec3f& n : scene.mesh.normal) n = x * n.x + y * n.y + z * n.z;
+  const Baked baked(scene, nullptr, {.size = {7, 7, 7}, .rays = 256});
+  double least = 1e9, most = 0, off = 0;
+  for (const SurfaceSample& s : sample_surface(scene.mesh, 2000, 1)) {
+    const SurfacePoint p = surface_point(scene, s.triangle, s.u, s.v);
+    const double e = baked.at(to_double(p.position), p.normal) / kPi;
+    least = std::min(least, e), most = std::max(most, e), off += std::abs(e - 1) > 0.05 ? 1 : 0;
+  }
+  // Measured .85 to 1.00, three places off by more than .05: a vote of a few places is not a ray for each. Without
+  // neighbours' corners slivers read the darkness outside: 0.
+  EXPECT_GT(least, 0.75);
+  EXPECT_LT(most, 1.05);
+  EXPECT_LT(off, 20);
 }
 
 TEST(BakeGrid, VerticesInsideSolidsAreFoundAndFilled) {

@@ -75,8 +75,8 @@ TEST(CellCorners, AreThoseThatARayForEachLookUpFinds) {
       const auto& at = scene.mesh.position;
       const Vec3f p = at[a] * (1 - u - v) + at[b] * u + at[c] * v, n = scene.mesh.normal[a];
       const CellPlace place = place_in(lattice, to_double(p));
-      const std::uint8_t stored =
-          cells[lattice.cell_index(place.cell)].surface[nearest_direction(n)].at(place.fraction);
+      const CornerSet set = cells[lattice.cell_index(place.cell)].surface[nearest_direction(n)].at(place.fraction);
+      const std::uint8_t stored = set.cell == CornerSet::kOwnCell ? set.bits : std::uint8_t{0};
       const std::uint8_t seen = corners_seen(tracer, lattice, stands, place, offset_origin(p, n));
       for (int k = 0; k < 8; ++k) same += (stored >> k & 1) == (seen >> k & 1) ? 1U : 0U;
       bits += 8;

@@ -15,21 +15,23 @@ export interface GridFile {
   names: readonly string[]; // of the parts
   parts: Uint16Array[]; // RGBA halves, vertex (k * size.y + j) * size.x + i
   cells: Triple; // max(1, size - 1)
-  /// kCellBytes a cell: cut, bits below and bits above for +x -x +y -y +z -z, six unused, bits of eighths 0 to 7. Null:
-  /// every corner counts.
+  /// kCellBytes a cell: direction, offset, bits below, bits above for +x -x +y -y +z -z, cells below and above of each,
+  /// bits of eighths 0 to 7, four unused. Null: every corner counts.
   corners: Uint8Array | null;
 }
 
 const kExact = ['phi.x', 'phi.y', 'phi.z', 'a.x', 'a.y', 'a.z', 'b.xy', 'b.xz', 'b.yz'];
 const kPaper = ['px', 'nx', 'py', 'ny', 'pz', 'nz'].flatMap((d) => [`${d}.color`, `${d}.direction`]);
-export const kCellBytes = 32;
-export const kRoomBytes = 24; // where those of eighths begin
-/// Where the channels of each corner part go among them.
-const kCorners: readonly (readonly [string, readonly number[]])[] = [
-  ...['px', 'nx', 'py', 'ny', 'pz', 'nz'].map((d, i) => [`corners.${d}`, [3 * i, 3 * i + 1, 3 * i + 2]] as const),
-  ['corners.room.0', [24, 25, 26, 27]],
-  ['corners.room.1', [28, 29, 30, 31]],
-];
+export const kCellBytes = 48;
+export const kNeighbourBytes = 24; // where the cells begin
+export const kRoomBytes = 36; // and the bits of eighths
+export const kOwnCell = 13;
+/// Four bytes of a cell each, in order.
+const kCorners = ['px', 'nx', 'py', 'ny', 'pz', 'nz', 'cells.x', 'cells.y', 'cells.z', 'room.0', 'room.1'].map(
+  (name) => `corners.${name}`,
+);
+const limitOf = (byte: number): number =>
+  byte < kNeighbourBytes ? (byte % 4 ? 256 : 243) : byte < kRoomBytes ? 27 : 256;
 
 interface Part {
   name: string;
@@ -50,7 +52,7 @@ export function readGrid(file: ArrayBuffer): GridFile {
       throw new Error(`grid.exr: ${name} is not three numbers`);
     return numbers as unknown as Triple;
   };
-  if (text('kiln.grid') !== '1') throw new Error('grid.exr: kiln.grid is not 1');
+  if (text('kiln.grid') !== '2') throw new Error('grid.exr: kiln.grid is not 2');
   const blend = text('kiln.blend') === 'paper' ? 'paper' : 'exact';
   const size = triple('kiln.size');
   const names = blend === 'exact' ? kExact : kPaper;
@@ -96,11 +98,15 @@ function readParts(file: ArrayBuffer): Part[] {
 
 function readCorners(find: (name: string) => Uint16Array, cells: number): Uint8Array {
   const out = new Uint8Array(kCellBytes * cells);
-  for (const [name, places] of kCorners) {
+  kCorners.forEach((name, part) => {
     const pixels = find(name);
-    for (let i = 0; i < cells; ++i)
-      places.forEach((place, c) => (out[kCellBytes * i + place] = DataUtils.fromHalfFloat(pixels[4 * i + c])));
-  }
+    for (let i = 0; i < 4 * cells; ++i) {
+      const byte = 4 * part + (i % 4);
+      const value = DataUtils.fromHalfFloat(pixels[i]);
+      if (!(value >= 0 && value < limitOf(byte))) throw new Error(`grid.exr: part ${name} holds ${value}`);
+      out[kCellBytes * Math.floor(i / 4) + byte] = value;
+    }
+  });
   return out;
 }
 
@@ -116,11 +122,11 @@ export function irradianceAt(
   const t = [0, 1, 2].map((a) => clamp((p[a] - grid.origin[a]) / grid.spacing[a], 0, grid.size[a] - 1));
   const cell = [0, 1, 2].map((a) => clamp(Math.floor(t[a]), 0, Math.max(0, grid.size[a] - 2)));
   const f = [0, 1, 2].map((a) => t[a] - cell[a]);
-  const bits = cornerBits(grid, cell, f, n, place);
+  const bits = cornerBits(grid, cell, f, n, place); // may move cell and f
   const weights = Array.from({ length: 8 }, (_, b) =>
     ((bits >> b) & 1) === 0
       ? 0
-      : [0, 1, 2].reduce((w, a) => w * ((b >> a) & 1 ? f[a] : 1 - f[a]), 1) + (bits === 255 ? 0 : 1e-4),
+      : [0, 1, 2].reduce((w, a) => w * (((b >> a) & 1 ? f[a] : 1 - f[a]) + (bits === 255 ? 0 : 1e-3)), 1),
   );
   const sum = weights.reduce((a, b) => a + b, 0);
   const read = (part: number, c: number): number =>
@@ -132,17 +138,33 @@ export function irradianceAt(
   return [0, 1, 2].map((c) => grid.scale * Math.max(0, blend(grid, n, c, read))) as [number, number, number];
 }
 
+/// Which corners count. Moves `cell` and `f` into the cell that they are of.
 function cornerBits(grid: GridFile, cell: number[], f: number[], n: Triple, place: 'surface' | 'room'): number {
   if (!grid.corners) return 255;
   const at = kCellBytes * ((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
-  const size = n.map(Math.abs);
-  const axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-  const side = at + 3 * (2 * axis + (n[axis] < 0 ? 1 : 0));
-  const cut = grid.corners[side];
-  const above = cut !== 0 && f[cut >> 6] >= (cut & 63) / 64;
-  const surface = place === 'surface' ? grid.corners[side + (above ? 2 : 1)] : 0;
+  if (place === 'surface') {
+    const size = n.map(Math.abs);
+    const axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
+    const side = 2 * axis + (n[axis] < 0 ? 1 : 0);
+    const [direction, offset] = grid.corners.subarray(at + 4 * side);
+    const above = offset !== 0 && planeHeight(direction, f) >= offset ? 1 : 0;
+    const bits = grid.corners[at + 4 * side + 2 + above];
+    const c = grid.corners[at + kNeighbourBytes + 2 * side + above];
+    const step = [(c % 3) - 1, (Math.floor(c / 3) % 3) - 1, Math.floor(c / 9) - 1];
+    const to = cell.map((x, a) => x + step[a]);
+    if (bits !== 0 && to.every((x, a) => x >= 0 && x < grid.cells[a])) {
+      for (let a = 0; a < 3; ++a) [cell[a], f[a]] = [to[a], clamp(f[a] - step[a], 0, 1)];
+      return bits;
+    }
+  }
   const eighth = f.reduce((sum, x, a) => sum + (x >= 0.5 ? 1 << a : 0), 0);
-  return surface || grid.corners[at + kRoomBytes + eighth] || 255;
+  return grid.corners[at + kRoomBytes + eighth] || 255;
+}
+
+function planeHeight(direction: number, f: number[]): number {
+  const axis = Math.floor(direction / 81);
+  const along = [1, (Math.floor(direction / 9) % 9) / 4 - 1, (direction % 9) / 4 - 1];
+  return along.reduce((sum, m, k) => sum + 80 * m * (f[(axis + k) % 3] - 0.5), 128);
 }
 
 function blend(grid: GridFile, n: Triple, c: number, read: (part: number, c: number) => number): number {

@@ -170,8 +170,10 @@ function partialCells({ corners, cells }: GridFile): number[] {
   const out: number[] = [];
   if (!corners) return out;
   for (let i = 0; i < corners.length / kCellBytes; ++i) {
-    const bytes = corners.subarray(kCellBytes * i, kCellBytes * (i + 1));
-    const whole = bytes.every((b, k) => b === 255 || (k < kRoomBytes && b === 0));
+    const cell = corners.subarray(kCellBytes * i, kCellBytes * (i + 1));
+    const sides = [0, 1, 2, 3, 4, 5].flatMap((d) => [cell[4 * d + 2], ...(cell[4 * d + 1] ? [cell[4 * d + 3]] : [])]);
+    const rooms = cell.subarray(kRoomBytes, kRoomBytes + 8);
+    const whole = sides.every((b) => b === 255 || b === 0) && rooms.every((b) => b === 255);
     if (!whole) out.push(...placeOf(i, cells));
   }
   return out;

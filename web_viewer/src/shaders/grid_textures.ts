@@ -12,7 +12,7 @@ import {
   UnsignedIntType,
   Vector3,
 } from 'three';
-import { type GridFile, kCellBytes, kRoomBytes } from '../asset/grid_file';
+import { type GridFile, kCellBytes, kNeighbourBytes, kOwnCell, kRoomBytes } from '../asset/grid_file';
 
 export class GridTextures {
   readonly uniforms: Record<string, { value: unknown }>;
@@ -29,7 +29,7 @@ export class GridTextures {
     });
     const corners = new Data3DTexture(
       new Uint32Array(cornerBytes(grid).buffer),
-      2 * grid.cells[0], // two texels of sixteen bytes a cell
+      3 * grid.cells[0], // three texels of sixteen bytes a cell
       grid.cells[1],
       grid.cells[2],
     );
@@ -61,7 +61,13 @@ export class GridTextures {
 }
 
 function cornerBytes(grid: GridFile): Uint8Array {
-  return grid.corners ?? new Uint8Array(kCellBytes * grid.cells[0] * grid.cells[1] * grid.cells[2]).fill(255);
+  if (grid.corners) return grid.corners;
+  const open = Uint8Array.from({ length: kCellBytes }, (_, i) =>
+    i < kNeighbourBytes ? (i % 4 < 2 ? 0 : 255) : i < kRoomBytes ? kOwnCell : 255,
+  );
+  const out = new Uint8Array(kCellBytes * grid.cells[0] * grid.cells[1] * grid.cells[2]);
+  for (let at = 0; at < out.length; at += kCellBytes) out.set(open, at);
+  return out;
 }
 
 const kNumbers = (n: number) => Array.from({ length: n }, (_, i) => i);
@@ -82,43 +88,57 @@ struct GridPlace {
   bool whole;    // every corner counts
 };
 
-uint gridByte(uvec4 words[2], int i) {
+uint gridByte(uvec4 words[3], int i) {
   return (words[i >> 4][(i >> 2) & 3] >> uint(8 * (i & 3))) & 255u;
 }
 
-uint gridBits(uvec4 words[2], vec3 f, vec3 n, bool surface) {
-  uint bits = 0u;
+float gridHeight(uint direction, vec3 f) {
+  int axis = int(direction) / 81;
+  vec3 m = vec3(1.0, float(int(direction) / 9 % 9) / 4.0 - 1.0, float(int(direction) % 9) / 4.0 - 1.0);
+  m = axis == 0 ? m : axis == 1 ? m.zxy : m.yzx;
+  return 80.0 * dot(m, f - 0.5) + 128.0;
+}
+
+/// Which corners count. Moves cell and f into the cell that they are of.
+uint gridBits(inout ivec3 cell, inout vec3 f, vec3 n, bool surface) {
+  uvec4 words[3];
+  for (int i = 0; i < 3; ++i) words[i] = texelFetch(gridCorners, cell * ivec3(3, 1, 1) + ivec3(i, 0, 0), 0);
   if (surface) {
     vec3 size = abs(n);
     int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    int side = 3 * (2 * axis + (n[axis] < 0.0 ? 1 : 0));
-    uint cut = gridByte(words, side);
-    bool above = cut != 0u && f[cut >> 6] >= float(cut & 63u) / 64.0;
-    bits = gridByte(words, side + (above ? 2 : 1));
+    int side = 2 * axis + (n[axis] < 0.0 ? 1 : 0);
+    uint offset = gridByte(words, 4 * side + 1);
+    int above = offset != 0u && gridHeight(gridByte(words, 4 * side), f) >= float(offset) ? 1 : 0;
+    uint bits = gridByte(words, 4 * side + 2 + above);
+    int c = int(gridByte(words, ${kNeighbourBytes} + 2 * side + above));
+    ivec3 steps = ivec3(c % 3, c / 3 % 3, c / 9) - 1;
+    ivec3 to = cell + steps;
+    bool within = all(greaterThanEqual(to, ivec3(0))) && all(lessThan(to, max(ivec3(1), ivec3(gridSize) - 1)));
+    if (bits != 0u && within) {
+      cell = to;
+      f = clamp(f - vec3(steps), 0.0, 1.0);
+      return bits;
+    }
   }
   int eighth = (f.x >= 0.5 ? 1 : 0) + (f.y >= 0.5 ? 2 : 0) + (f.z >= 0.5 ? 4 : 0);
-  if (bits == 0u) bits = gridByte(words, ${kRoomBytes} + eighth);
-  return bits == 0u ? 255u : bits;
+  uint room = gridByte(words, ${kRoomBytes} + eighth);
+  return room == 0u ? 255u : room;
 }
 
 GridPlace gridPlace(vec3 p, vec3 n, bool surface) {
   GridPlace place;
   vec3 t = clamp((p - gridOrigin) / gridSpacing, vec3(0.0), gridSize - 1.0);
   place.cell = clamp(ivec3(floor(t)), ivec3(0), max(ivec3(0), ivec3(gridSize) - 2));
-  place.at = (t + 0.5) / gridSize;
   vec3 f = t - vec3(place.cell);
-  ivec3 word = place.cell * ivec3(2, 1, 1);
-  uvec4 words[2];
-  words[0] = texelFetch(gridCorners, word, 0);
-  words[1] = texelFetch(gridCorners, word + ivec3(1, 0, 0), 0);
-  uint bits = gridBits(words, f, n, surface);
+  uint bits = gridBits(place.cell, f, n, surface);
+  place.at = (vec3(place.cell) + f + 0.5) / gridSize;
   place.whole = bits == 255u;
   if (place.whole) return place;
   float sum = 0.0;
   for (int b = 0; b < 8; ++b) {
     vec3 up = vec3(b & 1, (b >> 1) & 1, (b >> 2) & 1);
-    vec3 w = mix(1.0 - f, f, up);
-    place.weight[b] = ((bits >> uint(b)) & 1u) == 0u ? 0.0 : w.x * w.y * w.z + 1e-4;
+    vec3 w = mix(1.0 - f, f, up) + 1e-3;
+    place.weight[b] = ((bits >> uint(b)) & 1u) == 0u ? 0.0 : w.x * w.y * w.z;
     sum += place.weight[b];
   }
   for (int b = 0; b < 8; ++b) place.weight[b] /= sum;
