@@ -8,6 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/grid/corner_votes.h"
+#include "core/grid/corners_beyond.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/points.h"
 #include "core/sphere/sampling.h"
@@ -121,57 +122,6 @@ std::vector<CornerVote> surface_votes(const Tracer& tracer, const Lattice& latti
   return votes;
 }
 
-/// Of a place from a vertex, in spacings; at least a hair.
-double squared_distance(const Lattice& lattice, const CornerVote& v, const std::array<int, 3>& vertex) {
-  const std::array<int, 3> cell = lattice.cell(v.key / kDirections);
-  double sum = 1e-6;
-  for (std::size_t axis = 0; axis < 3; ++axis) sum += std::pow(cell[axis] + v.fraction[axis] - vertex[axis], 2);
-  return sum;
-}
-
-/// For places that see no corner of their cell, as in slivers between a wall and the next vertices: the neighbour of
-/// which they see the most, nearer corners before others. Asks a few of the places.
-CornerSet neighbour_seen(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands, Votes votes,
-                         std::uint64_t& rays) {
-  constexpr std::size_t kAsked = 4;
-  const std::size_t asked = std::min(kAsked, votes.size());
-  CornerSet best;
-  double most = 0;
-  for (std::uint8_t cell = 0; cell < CornerSet::kCells; ++cell) {
-    double score = 0;
-    std::array<std::size_t, 8> seen{};
-    for (std::size_t i = 0; i < asked; ++i) {
-      const CornerVote& v = votes[i * votes.size() / asked];
-      const auto moved = moved_into(lattice, {lattice.cell(v.key / kDirections), v.fraction}, cell);
-      if (cell == CornerSet::kOwnCell || !moved) break;
-      const std::uint8_t bits = corners_seen(tracer, lattice, stands, *moved, v.origin);
-      rays += 8;
-      for (std::size_t k = 0; k < 8; ++k) {
-        if ((bits >> k & 1) == 0) continue;
-        ++seen[k];
-        score += 1 / squared_distance(lattice, v, lattice.corner(moved->cell, static_cast<int>(k)));
-      }
-    }
-    unsigned bits = 0;
-    for (std::size_t k = 0; k < 8; ++k) bits |= seen[k] > 0 && 2 * seen[k] >= asked ? 1U << k : 0U;
-    if (bits != 0 && score > most) most = score, best = {cell, static_cast<std::uint8_t>(bits)};
-  }
-  return best;
-}
-
-/// Sides of a cut of which no corner is seen look into a neighbour.
-void look_beyond(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands, Votes votes,
-                 CornerCut& cut, std::uint64_t& rays) {
-  for (CornerSet* side : {&cut.below, &cut.above}) {
-    if (side->bits != 0 || (side == &cut.above && cut.offset == 0)) continue;
-    std::vector<CornerVote> own;
-    for (const CornerVote& v : votes) {
-      if (&cut.at(v.fraction) == side) own.push_back(v);
-    }
-    *side = neighbour_seen(tracer, lattice, stands, own, rays);
-  }
-}
-
 /// Whether the plane of a triangle passes through a box, or within half a box of it.
 bool plane_meets(const Vec3d& normal, const Vec3d& on_plane, const Vec3d& middle, const Vec3d& half) {
   const double reach = std::abs(normal.x) * half.x + std::abs(normal.y) * half.y + std::abs(normal.z) * half.z;
@@ -255,6 +205,7 @@ std::vector<CellCorners> find_cell_corners(const Tracer& tracer, const Lattice& 
     }
     asked += own;
   });
+  fill_grazed(lattice, crossed, cells, threads);
   rays += asked + 8 * votes.size();
   return cells;
 }

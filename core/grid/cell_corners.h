@@ -5,8 +5,7 @@
 // lie
 //           along two axes, at least one), on the sides that show. Each asks for the corners it sees, and its normal
 //           says which of six directions it votes for (corner_votes.h).
-// Slivers   Places that see no corner of their cell, between a wall and the vertices beyond it, look into the neighbour
-//           of which they see the most.
+// Slivers   Places that see no corner of their cell look into a neighbour (corners_beyond.h).
 // Rooms     In cells that a triangle passes through, the middle of each eighth asks. All corners count elsewhere.
 // Beats     plane tests (shared notes, measured); a ray for every look-up is the truth it is tested against.
 // Cost      8 rays for each point; 64 for each cell that a surface passes through
