@@ -30,7 +30,8 @@ SphereGather::SphereGather(const World& world, GridContent content, int rays, st
     : world_(world),
       content_(content),
       seed_(mix64(seed ^ 0x67726964ULL)),
-      sets_(0, rays, kSets, seed_, kFirstRays, Spread::sphere),
+      few_(0, std::min(rays, kFewRays), kSets, seed_, 0, Spread::sphere),
+      more_(0, std::max(0, rays - few_.samples()), kSets, mix64(seed_), 0, Spread::sphere),
       emitters_(world.tracer.scene()) {
   if (content == GridContent::indirect || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
@@ -38,15 +39,14 @@ SphereGather::SphereGather(const World& world, GridContent content, int rays, st
 }
 
 GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const {
-  const LocalFrame frame = turned(sets_, seed_, item);
+  const LocalFrame frame = turned(few_, seed_, item);
   Work work{Random(seed_, item, 2), {}, rays};
   Rays16 from;
   from.ox.fill(place.x), from.oy.fill(place.y), from.oz.fill(place.z), from.far.fill(kFar);
-  const int packets = sets_.samples() / kPacket;
-  for (int first = 0; first < packets; first += kBatch) {
-    if (work.sent == kFirstRays && work.open == 0) break;  // inside a solid
-    trace_batch(frame, first, std::min(first + kBatch, packets), from, work);
-  }
+  trace_batch(few_, frame, 0, from, work);
+  // Rays lie along a curve, so that packets of the large set are narrow; where nothing is seen, inside solids, none go.
+  for (int first = 0; first < more_.samples() / kPacket && work.open > 0; first += kBatch)
+    trace_batch(more_, frame, first, from, work);
   GatheredLight out{work.sums.vectors(kSphere / static_cast<float>(work.sent)),
                     static_cast<float>(work.backs) / static_cast<float>(work.sent)};
   if (content_ == GridContent::all) {
@@ -59,15 +59,17 @@ GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint
   return out;
 }
 
-/// Packets first .. end - 1: all are traced before any hit is looked at, so that what the hits need is in the cache.
-void SphereGather::trace_batch(const LocalFrame& frame, int first, int end, Rays16& from, Work& work) const {
+/// kBatch packets from `first` on: all are traced before any hit is looked at, so that what the hits need is in the
+/// cache.
+void SphereGather::trace_batch(const DirectionSets& sets, const LocalFrame& frame, int first, Rays16& from,
+                               Work& work) const {
   std::array<Rays16, kBatch> rays;
   std::array<Hits16, kBatch> hits;
-  const auto count = static_cast<std::size_t>(end - first);
+  const auto count = static_cast<std::size_t>(std::min(kBatch, sets.samples() / kPacket - first));
   int inside = 0;
   for (std::size_t k = 0; k < count; ++k) {
     rays[k] = from;
-    sets_.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
+    sets.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
     world_.tracer.closest16(rays[k], hits[k]);
     for (std::size_t i = 0; i < kPacket; ++i) {
       const std::uint32_t triangle = hits[k].triangle[i];
@@ -86,7 +88,7 @@ void SphereGather::trace_batch(const LocalFrame& frame, int first, int end, Rays
       }
     }
   };
-  if (first == 0) {
+  if (&sets == &few_) {
     each([&](const Vec3f& w, const Hit& hit) {
       if (hit && world_.faces.side(hit.triangle, w) != HitSide::front) ++inside;
     });
@@ -140,21 +142,21 @@ void SphereGather::add_lamps(const Vec3f& place, OctantSums& sums, std::uint64_t
 
 void SphereGather::add_bright_sky(const Vec3f& place, std::uint64_t item, OctantSums& sums, std::uint64_t& rays) const {
   if (!bright_) return;
-  for (int k = 0; k < sets_.samples(); ++k) {
+  for (int k = 0; k < count(); ++k) {
     const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x736b79ULL)));
     const Vec3d w = bright_->sample({u.x, u.y});
     if (world_.tracer.occluded(place, to_float(w), kFar)) continue;
-    const double share = 1 / (sets_.samples() * (kUniform + bright_->density(w)));
+    const double share = 1 / (count() * (kUniform + bright_->density(w)));
     sums.add(to_float(w), environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share));
   }
-  rays += static_cast<std::uint64_t>(sets_.samples());
+  rays += static_cast<std::uint64_t>(count());
 }
 
 void SphereGather::add_emitters(const Vec3f& place, std::uint64_t item, OctantSums& sums, std::uint64_t& rays) const {
   if (emitters_.empty()) return;
   Random random(seed_, item, 3);
-  for (int k = 0; k < sets_.samples(); ++k) {
-    const double pick = (k + random.uniform_double()) / sets_.samples();
+  for (int k = 0; k < count(); ++k) {
+    const double pick = (k + random.uniform_double()) / count();
     const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x6c616d70ULL)));
     const EmitterSample to = emitters_.sample(pick, {u.x, u.y});
     const Vec3d way = to.position - to_double(place);
@@ -166,9 +168,9 @@ void SphereGather::add_emitters(const Vec3f& place, std::uint64_t item, OctantSu
     const float far = length(end);
     if (world_.tracer.occluded(place, normalized(end), far)) continue;
     const double density = to.density * distance2 / std::abs(facing);
-    sums.add(to_float(w), to_float(to.radiance / (sets_.samples() * (density + kUniform))));
+    sums.add(to_float(w), to_float(to.radiance / (count() * (density + kUniform))));
   }
-  rays += static_cast<std::uint64_t>(sets_.samples());
+  rays += static_cast<std::uint64_t>(count());
 }
 
 }  // namespace kiln

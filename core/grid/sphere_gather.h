@@ -4,8 +4,9 @@
 // Indirect L is what surfaces reflect (core/meshless/lit_surface.h): a ray costs its hit and one read of a table.
 // All      adds emitters and the sky, by the same rays and as many towards the emitters and the sky's bright parts,
 //          joined by the balance heuristic (Veach and Guibas 1995); punctual lights exactly.
-// Rays     stratified sets on the sphere, each place by a turn of its own. A place of which the first kFirstRays meet
-//          neither sky nor a surface that light is known of is inside a solid and takes no more.
+// Rays     a small and a large stratified set on the sphere, each place by a turn of its own. A place of which the
+// small
+//          one meets neither sky nor a surface that light is known of is inside a solid and takes no more.
 // Error    that of N stratified rays and of the lit surface.   Repeat  a pure function of its arguments
 
 #include <cstdint>
@@ -42,8 +43,8 @@ class SphereGather {
   GatheredLight at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const;
 
  private:
-  static constexpr int kBatch = 4;                     // packets that are traced together
-  static constexpr int kFirstRays = kBatch * kPacket;  // a stratified set of their own
+  static constexpr int kBatch = 4;  // packets that are traced together
+  static constexpr int kFewRays = kBatch * kPacket;
   /// A place in the making.
   struct Work {
     Random random;
@@ -53,7 +54,8 @@ class SphereGather {
         open = 0;           // rays of the sphere; open: they met the sky, or a surface that light is known of
     bool enclosed = false;  // most of the first rays met backs: senders must be seen to answer
   };
-  void trace_batch(const LocalFrame&, int first, int end, Rays16& from, Work&) const;
+  void trace_batch(const DirectionSets&, const LocalFrame&, int first, Rays16& from, Work&) const;
+  int count() const { return few_.samples() + more_.samples(); }
   Vec3f look_along(const Vec3f& w, const Hit&, Work&) const;
   Vec3f seen_sky(const Vec3f& w) const;
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
@@ -64,7 +66,7 @@ class SphereGather {
   World world_;
   GridContent content_;
   std::uint64_t seed_;
-  DirectionSets sets_;
+  DirectionSets few_, more_;
   EmitterSampler emitters_;
   std::optional<EnvironmentSampler> bright_;  // of a map that has brighter and darker parts
 };
