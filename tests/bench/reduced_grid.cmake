@@ -1,0 +1,5 @@
+if(TARGET kiln_bake)
+  add_executable(kiln_reduced_grid reduced_grid.cpp)
+  kiln_flags(kiln_reduced_grid)
+  target_link_libraries(kiln_reduced_grid PRIVATE kiln_bake nlohmann_json::nlohmann_json)
+endif()
