@@ -86,13 +86,14 @@ TEST(Grid, CornersThatDoNotCountLeaveTheirWeightToTheOthers) {
   open.room.fill(0xff);
   grid.cells.assign(kLattice.cell_count(), open);
   CellCorners& cell = grid.cells[kLattice.cell_index(place_in(kLattice, at_wall).cell)];
-  cell.surface[1].below = 0b01010101;  // normals to -x see the corners of lower x
-  cell.surface[0].below = 0b10101010;
+  cell.surface[1].below.bits = 0b01010101;  // normals to -x see the corners of lower x
+  cell.surface[0].below.bits = 0b10101010;
   EXPECT_FLOAT_EQ(irradiance_at(grid, at_wall, {1, 0, 0}).x, 0);
   grid.parts[0].swap(grid.parts[1]);  // now what -y reads is -f / 2; +y reads it
-  cell.surface[2].below = 0b01010101;
+  cell.surface[2].below.bits = 0b01010101;
   EXPECT_FLOAT_EQ(irradiance_at(grid, at_wall, {0, 1, 0}).x, 1);
-  cell.surface[2] = {0 << 6 | 32, 0b01010101, 0b10101010};  // cut in the middle along x
+  constexpr std::uint8_t kAcrossX = 40;  // m = (1, 0, 0)
+  cell.surface[2] = {kAcrossX, 128, {CornerSet::kOwnCell, 0b01010101}, {CornerSet::kOwnCell, 0b10101010}};
   EXPECT_FLOAT_EQ(irradiance_at(grid, {2.99, 2, 2}, {0, 1, 0}).x, 1);
   EXPECT_FLOAT_EQ(irradiance_at(grid, {3.01, 2, 2}, {0, 1, 0}).x, 0);
   cell.room[0] = 0;  // nothing counts: everything does
