@@ -66,7 +66,6 @@ void SphereGather::trace_batch(const DirectionSets& sets, const LocalFrame& fram
   std::array<Rays16, kBatch> rays;
   std::array<Hits16, kBatch> hits;
   const auto count = static_cast<std::size_t>(std::min(kBatch, sets.samples() / kPacket - first));
-  int inside = 0;
   for (std::size_t k = 0; k < count; ++k) {
     rays[k] = from;
     sets.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
@@ -88,12 +87,6 @@ void SphereGather::trace_batch(const DirectionSets& sets, const LocalFrame& fram
       }
     }
   };
-  if (&sets == &few_) {
-    each([&](const Vec3f& w, const Hit& hit) {
-      if (hit && world_.faces.side(hit.triangle, w) != HitSide::front) ++inside;
-    });
-    work.enclosed = 2 * inside > sent;
-  }
   each([&](const Vec3f& w, const Hit& hit) { work.sums.add(w, look_along(w, hit, work)); });
 }
 
@@ -109,7 +102,7 @@ Vec3f SphereGather::look_along(const Vec3f& w, const Hit& hit, Work& work) const
     return {};
   }
   LitSurface::Reflected from{.light = {}, .known = true};
-  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, work.enclosed, work.random, work.rays);
+  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, work.random, work.rays);
   if (from.known) ++work.open;
   return all ? from.light + seen_emitter(hit, w) : from.light;
 }

@@ -51,8 +51,7 @@ class SphereGather {
     OctantSums sums;
     std::uint64_t& rays;
     int sent = 0, backs = 0,
-        open = 0;           // rays of the sphere; open: they met the sky, or a surface that light is known of
-    bool enclosed = false;  // most of the first rays met backs: senders must be seen to answer
+        open = 0;  // rays of the sphere; open: they met the sky, or a surface that light is known of
   };
   void trace_batch(const DirectionSets&, const LocalFrame&, int first, Rays16& from, Work&) const;
   int count() const { return few_.samples() + more_.samples(); }

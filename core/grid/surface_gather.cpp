@@ -60,7 +60,7 @@ Vec3f SurfaceGather::at(const Receiver& place, std::uint64_t item, std::uint64_t
     for (std::size_t i = 0; i < kPacket; ++i) {
       const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
       if (!hit) continue;
-      sum += world_.surface->reflected(hit, {packet.dx[i], packet.dy[i], packet.dz[i]}, false, random, rays).light;
+      sum += world_.surface->reflected(hit, {packet.dx[i], packet.dy[i], packet.dz[i]}, random, rays).light;
     }
   }
   rays += static_cast<std::uint64_t>(sets_.samples());

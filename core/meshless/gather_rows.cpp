@@ -20,7 +20,7 @@ std::uint16_t to_fixed(float x) { return static_cast<std::uint16_t>(std::lrint(s
 GatherRows::GatherRows(const SenderPaths& paths, int rays, std::uint64_t seed)
     : paths_(paths), sets_(0, rays, kSets, mix64(seed), kFirstRays), seed_(seed) {}
 
-void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threads& threads, std::uint64_t& rays) {
+void GatherRows::add(std::span<const TransferPoint> points, Threads& threads, std::uint64_t& rays) {
   const std::size_t first_row = row_.size(), first_chunk = chunks_.size();
   row_.resize(first_row + points.size());
   chunks_.resize(first_chunk + (points.size() + kChunk - 1) / kChunk);
@@ -33,7 +33,7 @@ void GatherRows::add(std::span<const TransferPoint> points, bool enclosed, Threa
       Row& row = row_[first_row + i];
       row.chunk = static_cast<std::uint32_t>(chunk);
       row.first = static_cast<std::uint32_t>(entries.size());
-      Work work{entries, row, Random(seed_, point_key(points[i]), 1), 0, enclosed};
+      Work work{entries, row, Random(seed_, point_key(points[i]), 1)};
       trace(points[i], work);
       row.count = static_cast<std::uint32_t>(entries.size()) - row.first;
       sent += work.rays;
@@ -49,12 +49,9 @@ void GatherRows::trace(const TransferPoint& point, Work& work) const {
   Rays16 rays;
   Hits16 hits;
   rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
-  const std::size_t before = work.entries.size();
+  int dark = 0;
   for (int packet = 0; packet < sets_.samples() / kPacket; ++packet) {
-    if (work.enclosed && packet * kPacket == kFirstRays && work.entries.size() == before &&
-        work.row.constant == Vec3f{}) {
-      break;
-    }
+    if (packet * kPacket == kFirstRays && dark == kFirstRays) break;
     sets_.turn(frame.set, packet, frame.basis, rays);
     paths_.world().tracer.closest16(rays, hits);
     work.rays += kPacket;
@@ -62,7 +59,8 @@ void GatherRows::trace(const TransferPoint& point, Work& work) const {
       if (hits.triangle[i] == kNoHit) continue;
       const Hit hit{hits.t[i], hits.u[i], hits.v[i], hits.triangle[i], false};
       const Vec3f w{rays.dx[i], rays.dy[i], rays.dz[i]};
-      const SenderPaths::End end = paths_.follow(hit, w, work.enclosed, work.random, work.rays);
+      if (paths_.world().faces.side(hit.triangle, w) == HitSide::dark) ++dark;
+      const SenderPaths::End end = paths_.follow(hit, w, work.random, work.rays);
       work.row.constant += end.picked_up;
       if (end.sender == Senders::kNone) continue;
       const Vec3f& t = end.throughput;

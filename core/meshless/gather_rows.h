@@ -48,9 +48,8 @@ class GatherRows {
   GatherRows(const SenderPaths&, int rays, std::uint64_t seed);
 
   /// Traces a row for each point and appends them in order. Adds the rays sent to `rays`.
-  /// `enclosed`: the points are inside solids, where the nearest sender may stand beyond a wall. Then a sender answers
-  /// only for places it can see, and a point that its first kFirstRays rays find dark takes no more.
-  void add(std::span<const TransferPoint>, bool enclosed, Threads&, std::uint64_t& rays);
+  /// A point whose first kFirstRays rays all end at dark backs is inside a solid and takes no more.
+  void add(std::span<const TransferPoint>, Threads&, std::uint64_t& rays);
   static constexpr int kFirstRays = 4 * kPacket;  // a stratified set of their own
   std::size_t size() const { return row_.size(); }
 
@@ -80,7 +79,6 @@ class GatherRows {
     Row& row;
     Random random;
     std::uint64_t rays = 0;
-    bool enclosed = false;
   };
   void trace(const TransferPoint&, Work&) const;
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/base/expects.h"
+#include "core/prt/ray_origin.h"
 
 namespace kiln {
 namespace {

@@ -7,8 +7,11 @@
 #include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/meshless/basis.h"
+#include "core/meshless/demand.h"
 #include "core/meshless/free_places.h"
+#include "core/meshless/in_sight.h"
 #include "core/meshless/link_reading.h"
+#include "core/meshless/point_grid.h"
 #include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 
@@ -80,13 +83,36 @@ struct LinkBuilder::Work {
     coarse = coarse_part(all, sender_levels(all, params.sender_level, params.most_senders));
     for (std::size_t level = 0; level < all.levels(); ++level)
       stats.points.push_back(all.level_end[level] - all.begin(level));
-    stats.senders = static_cast<std::uint32_t>(coarse.points.size());
     stats.sender_level = static_cast<int>(coarse.levels()) - 1;
-    senders.emplace(tracer.scene(), coarse, placement, threads);
-    paths.emplace(SenderPaths::World{tracer, faces, albedo, *senders, nullptr, true});
+    ask_for_senders(threads);
+    paths.emplace(SenderPaths::World{tracer, faces, albedo, *senders, nullptr});
     sender_rows.emplace(*paths, params.rays, params.seed);
     lone_rows.emplace(*paths, std::min(params.rays, kMostLoneRays), mix64(params.seed));
     links.sample_begin = {0}, links.child_begin = {0}, links.link_begin = {0};
+  }
+
+  /// Senders where vertices or rays ask for some; they come before the finer points.
+  void ask_for_senders(Threads& threads) {
+    const std::size_t placed = coarse.points.size(), levels = coarse.levels();
+    senders.emplace(tracer, coarse, placement, threads);
+    const std::vector<TransferPoint> vertices = vertex_points(tracer.scene().mesh);
+    const std::vector<std::uint32_t> group = groups_of(tracer.scene().mesh);
+    std::vector<Readings::Place> readers;
+    for (std::size_t v = 0; v < vertices.size(); ++v) readers.push_back({vertices[v], group[v]});
+    const std::size_t most =
+        std::min<std::size_t>(std::max<std::size_t>(2 * placed, params.most_senders), kMostSenders);
+    add_demanded({tracer, faces, placement, readers, most}, coarse, *senders, threads);
+    stats.senders = static_cast<std::uint32_t>(coarse.points.size());
+    if (!coarse.demanded) return;
+    const std::size_t added = coarse.points.size() - placed;
+    PointHierarchy joined = coarse;
+    joined.points.insert(joined.points.end(), all.points.begin() + static_cast<std::ptrdiff_t>(placed),
+                         all.points.end());
+    for (std::size_t level = levels; level < all.levels(); ++level) {
+      joined.level_end.push_back(all.level_end[level] + static_cast<std::uint32_t>(added));
+      joined.radius.push_back(all.radius[level]);
+    }
+    all = std::move(joined);
   }
 
   void begin_stage(std::string_view name) const {
@@ -119,7 +145,7 @@ struct LinkBuilder::Work {
     read_row = readable(all.levels());
     std::vector<LinkReading::Receiver> receivers;
     for (const std::uint32_t r : read_row) receivers.push_back({all.points[receiver[r]].site, link_row[r]});
-    reading.emplace(tracer, std::move(receivers), params.neighbours, threads);
+    reading.emplace(tracer, receivers, params.neighbours, threads);
   }
 
   /// Rows `first` and on of `from`, those of them that are `chosen`.
@@ -136,7 +162,7 @@ struct LinkBuilder::Work {
     std::vector<std::uint32_t> own(coarse.points.size());
     for (std::uint32_t i = 0; i < own.size(); ++i) own[i] = i;
     const std::vector<TransferPoint> places = places_of(own);
-    sender_rows->add(places, false, threads, stats.rays);
+    sender_rows->add(places, threads, stats.rays);
     link_senders({*sender_rows, 0, places, params.sender_oracle, own}, threads);
     links.children = tree.children;
     for (const std::uint32_t p : own) add_site(all.points[p].site, level_of(p));
@@ -153,7 +179,7 @@ struct LinkBuilder::Work {
       for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
       const std::vector<TransferPoint> places = places_of(batch);
       GatherRows rows(*paths, params.rays, params.seed);
-      rows.add(places, false, threads, stats.rays);
+      rows.add(places, threads, stats.rays);
       add_readable({rows, 0, places, params.oracle, every}, batch, threads);
       for (std::size_t i = 0; i < batch.size(); ++i) measure(rows, i);
     }
@@ -315,18 +341,20 @@ struct LinkBuilder::Work {
   void refine(Threads& threads) {
     if (probes() == 0) return;
     for (std::size_t level = coarse.levels(); level < all.levels(); ++level) {
-      const std::vector<std::uint32_t> chosen = children_of(mispredicted(level - 1, threads), level);
+      // Parents of the first finer points are those of the last level of senders, asked for or not.
+      const std::size_t first = level == coarse.levels() ? coarse.placed_levels() - 1 : level - 1;
+      const std::vector<std::uint32_t> chosen = children_of(mispredicted(first, level, threads), level);
       if (chosen.empty()) return;
       gather(chosen, threads);
     }
   }
 
-  /// Points of a level whose light the coarser ones do not predict.
-  std::vector<std::uint32_t> mispredicted(std::size_t level, Threads& threads) const {
+  /// Points of levels from `level` to below `end` whose light the coarser ones do not predict.
+  std::vector<std::uint32_t> mispredicted(std::size_t level, std::size_t end, Threads& threads) const {
     std::vector<std::uint32_t> asked;
     for (std::uint32_t r = 0; r < receiver.size(); ++r) {
       const std::uint32_t p = receiver[r];
-      if (p >= all.begin(level) && p < all.level_end[level] && !all.points[p].behind) asked.push_back(r);
+      if (p >= all.begin(level) && p < all.level_end[end - 1] && !all.points[p].behind) asked.push_back(r);
     }
     if (level == 0) {
       std::vector<std::uint32_t> out;
@@ -378,7 +406,7 @@ struct LinkBuilder::Work {
     if (probes() == 0) return out;
     threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const LinkReading::Seen near = reading->seen(places[i], 0);
+        const Reading::Seen near = reading->seen(places[i], 0);
         std::vector<float> light(probes());
         for (const BasisTerm& t : near.terms) {
           const std::size_t first = read_row[t.function] * probes();
@@ -394,11 +422,6 @@ struct LinkBuilder::Work {
 
   // Step 5.
 
-  struct VertexReading {
-    std::vector<RowTerm> terms;  // none: it gathers for itself
-    bool enclosed = false;
-  };
-
   LightLinks finish(const Mesh& mesh, Threads& threads) {
     LightLinks out = links;
     out.term_begin = {0};
@@ -410,44 +433,62 @@ struct LinkBuilder::Work {
     const std::vector<bool> dark;
     for (const StandIn& s : find_stand_ins(mesh, dark, hidden_test(tracer), threads)) vertices[s.vertex] = s.point;
     const std::vector<std::uint32_t> group = groups_of(mesh);
-    std::vector<VertexReading> of_vertex(vertices.size());
+    std::vector<std::vector<RowTerm>> terms(vertices.size());
     threads.for_blocks(vertices.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) {
-        VertexReading& own = of_vertex[v];
-        own.enclosed = is_enclosed(tracer, faces, vertices[v], true);
-        if (!own.enclosed) own.terms = reading->rows(vertices[v], group[v]);
-      }
+      for (std::size_t v = begin; v < end; ++v) terms[v] = reading->rows(vertices[v], group[v]);
     });
-    std::vector<TransferPoint> open, inside;
-    std::vector<std::uint32_t> open_vertex, inside_vertex;
-    for (std::uint32_t v = 0; v < of_vertex.size(); ++v) {
-      if (!of_vertex[v].terms.empty()) continue;
-      (of_vertex[v].enclosed ? inside : open).push_back(vertices[v]);
-      (of_vertex[v].enclosed ? inside_vertex : open_vertex).push_back(v);
-    }
+    read_nearest(vertices, group, terms);
     std::swap(links, out);
-    add_lone(open, open_vertex, false, of_vertex, threads);
-    add_lone(inside, inside_vertex, true, of_vertex, threads);
+    add_lone(vertices, terms, threads);
     std::swap(links, out);
-    stats.alone = open.size() + inside.size();
-    for (const VertexReading& r : of_vertex) {
-      out.terms.insert(out.terms.end(), r.terms.begin(), r.terms.end());
+    for (const std::vector<RowTerm>& own : terms) {
+      out.terms.insert(out.terms.end(), own.begin(), own.end());
       out.term_begin.push_back(static_cast<std::uint32_t>(out.terms.size()));
     }
     return out;
   }
 
-  void add_lone(const std::vector<TransferPoint>& places, const std::vector<std::uint32_t>& vertex, bool enclosed,
-                std::vector<VertexReading>& of_vertex, Threads& threads) {
-    const std::size_t first = lone_rows->size();
-    lone_rows->add(places, enclosed, threads, stats.rays);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      of_vertex[vertex[i]].terms = {{static_cast<std::uint32_t>(links.rows() + i), 255}};
-      add_site({places[i].position, places[i].normal, 0}, RowSite::kLone);
+  /// Vertices that see no receiver well enough take what the nearest sender receives.
+  void read_nearest(const std::vector<TransferPoint>& vertices, const std::vector<std::uint32_t>& group,
+                    std::vector<std::vector<RowTerm>>& terms) const {
+    std::vector<std::uint32_t> row_of(coarse.points.size(), kUnread);
+    for (std::size_t r = 0; r < receiver.size(); ++r) {
+      if (receiver[r] < row_of.size()) row_of[receiver[r]] = link_row[r];
     }
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      if (!terms[v].empty()) continue;
+      const std::uint32_t s = senders->nearest(reader_site({vertices[v], group[v]}, coarse.radius.back()));
+      if (s != Senders::kNone && row_of[s] != kUnread) terms[v] = {{row_of[s], 255}};
+    }
+  }
+
+  /// Rows for vertices that see no point at all; one does for those that see each other within the finest R.
+  void add_lone(const std::vector<TransferPoint>& vertices, std::vector<std::vector<RowTerm>>& terms,
+                Threads& threads) {
+    const float reach = all.radius.back();
+    PointGrid grid(2 * reach);
+    std::vector<TransferPoint> places;
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      if (!terms[v].empty()) continue;
+      const SurfaceSite site{vertices[v].position, vertices[v].normal};
+      auto row = static_cast<std::uint32_t>(places.size());
+      grid.near(site.position, reach, [&](std::uint32_t i, float d2) {
+        const SurfaceSite other{places[i].position, places[i].normal};
+        const float cosine = dot(site.normal, other.normal);
+        if (i >= row || cosine <= 0 || d2 > reach * reach * cosine * cosine) return;
+        if (in_sight(tracer, site, other)) row = i;
+      });
+      terms[v] = {{static_cast<std::uint32_t>(links.rows()) + row, 255}};
+      if (row < places.size()) continue;
+      grid.add(row, site.position);
+      places.push_back(vertices[v]);
+    }
+    stats.alone = places.size();
+    lone_rows->add(places, threads, stats.rays);
+    for (const TransferPoint& p : places) add_site({p.position, p.normal, 0}, RowSite::kLone);
     std::vector<std::uint32_t> every(places.size());
     for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
-    make_links({*lone_rows, first, places, params.oracle, every}, threads);
+    make_links({*lone_rows, 0, places, params.oracle, every}, threads);
   }
 
   std::vector<std::uint32_t> groups_of(const Mesh& mesh) const {

@@ -3,13 +3,15 @@
 // vertices of a mesh read.
 //  1. Points on all levels; those up to `sender_level` are senders, on both sides of double-sided faces, so that no
 //     light is lost on backs.
-//  2. Each sender gathers (gather_rows.h, strict paths), and its row becomes links (link_rows.h): few for the sweeps
+//  2. Each sender gathers (gather_rows.h), and its row becomes links (link_rows.h): few for the sweeps
 //     among senders, and more for vertices that read there.
 //  3. Finer points on the side of the vertex normals gather where one of kProbes lamps in free places lights a point
 //     otherwise than the points before it predict: by more than eps times the mean light of that lamp.
 //  4. After so many sweeps (at most kMostLinkSweeps) what is left of the lamps' light is taken for a geometric series,
 //     whose factor is steady by then: the doubt in it is below a thousandth of the light.
-//  5. Vertices read the receivers around them that they see (in_sight); one without any gathers for itself.
+//  5. Vertices read the receivers around them that they see (reading.h); one without any takes the nearest sender that
+//  it
+//     sees, and gathers for itself where there is none.
 // Paper   Lehtinen et al. 2007, section 6.5.   Differs  receivers are refined by what lamps do, not by the kernel
 // alone;
 //         one flat set of receivers is read by Shepard weights, as in radiosity.h, instead of splatting the hierarchy

@@ -1,15 +1,13 @@
 #pragma once
-// What a place reads of receivers: the Shepard weights of those around it that it can see (in_sight), so that nothing
-// is read through a wall. Repeat  a pure function of its arguments
+// What a place reads of receivers (reading.h), as rows of links and weights in whole numbers.
+// Repeat  a pure function of its arguments
 
 #include <cstdint>
 #include <vector>
 
 #include "core/base/threads.h"
-#include "core/meshless/basis.h"
 #include "core/meshless/light_links.h"
-#include "core/prt/transfer_point.h"
-#include "core/trace/tracer.h"
+#include "core/meshless/reading.h"
 
 namespace kiln {
 
@@ -21,24 +19,17 @@ class LinkReading {
     std::uint32_t row;
   };
 
-  /// Keeps a reference to the tracer. `neighbours` around each receiver set how far it is read (basis.h).
-  LinkReading(const Tracer&, std::vector<Receiver>, int neighbours, Threads&);
+  /// Keeps a reference to the tracer. `neighbours` around each receiver set how far it is read.
+  LinkReading(const Tracer&, const std::vector<Receiver>&, int neighbours, Threads&);
 
-  /// Receivers that a place sees, by their index, and the sum of their weights; none where none is near.
-  struct Seen {
-    std::vector<BasisTerm> terms;
-    float sum = 0;
-  };
-  Seen seen(const TransferPoint&, std::uint32_t group) const;
+  Reading::Seen seen(const TransferPoint& p, std::uint32_t group) const { return reading_.at(p, group); }
 
-  /// The same as rows and weights in 255ths that sum to 255, of which the smallest are left out. Empty where too
-  /// little is seen for an interpolation.
+  /// The same as rows and weights in 255ths that sum to 255, of which the smallest are left out.
   std::vector<RowTerm> rows(const TransferPoint&, std::uint32_t group) const;
 
  private:
-  const Tracer& tracer_;
-  std::vector<Receiver> receivers_;
-  MeshlessBasis basis_;
+  std::vector<std::uint32_t> row_;
+  Reading reading_;
 };
 
 }  // namespace kiln

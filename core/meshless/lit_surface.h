@@ -4,10 +4,12 @@
 // Units   W m^-2 sr^-1; `light` of a sender is irradiance / pi.   Repeat  a pure function of its arguments
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/threads.h"
 #include "core/meshless/points.h"
+#include "core/meshless/reading.h"
 #include "core/meshless/sender_paths.h"
 #include "core/scene/environment.h"
 
@@ -15,8 +17,12 @@ namespace kiln {
 
 class LitSurface {
  public:
+  struct Points {
+    PointPlacement placement;
+    std::span<const Readings::Place> readers;  // places that ask for points (demand.h)
+  };
   /// Keeps references to the tracer and to `sky`, which may be null. Places the senders; they are dark.
-  LitSurface(const Tracer&, const Environment* sky, const PointPlacement&, Threads&);
+  LitSurface(const Tracer&, const Environment* sky, const Points&, Threads&);
   LitSurface(const LitSurface&) = delete;
   LitSurface& operator=(const LitSurface&) = delete;
 
@@ -30,10 +36,9 @@ class LitSurface {
   /// Equation 1: what is reflected (not emitted) against a ray that lands at `hit`. Adds the rays of paths to `rays`.
   struct Reflected {
     Vec3f light;
-    bool known = false;  // some sender stands for the place, or for one that the path came to
+    bool known = false;  // some sender stands for the place, or for one that the path came to, and is in no pocket
   };
-  /// `enclosed` as in SenderPaths::follow.
-  Reflected reflected(const Hit& hit, const Vec3f& direction, bool enclosed, Random&, std::uint64_t& rays) const;
+  Reflected reflected(const Hit& hit, const Vec3f& direction, Random&, std::uint64_t& rays) const;
   /// Asks for what reflected() will read of this triangle.
   void prefetch(std::uint32_t triangle) const {
     faces_.prefetch(triangle);

@@ -52,29 +52,6 @@ bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
 }
 
-MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2<double>& uv, bool groups_by_part) {
-  const Mesh& mesh = scene.mesh;
-  const Triangle& t = mesh.triangles[triangle];
-  const auto u = static_cast<float>(uv.x), v = static_cast<float>(uv.y), w = 1 - u - v;
-  MeshlessPoint p{.triangle = triangle, .u = u, .v = v};
-  p.site.position = mesh.position[t[0]] * w + mesh.position[t[1]] * u + mesh.position[t[2]] * v;
-  p.site.group = groups_by_part ? mesh.part[triangle] : 0;
-  p.face_normal = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
-  const Vec3f shading = mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]];
-  if (is_double_sided(scene, triangle) && dot(p.face_normal, shading) < 0) p.face_normal = -p.face_normal;
-  p.site.normal = normalized(mesh.normal[t[0]] * w + mesh.normal[t[1]] * u + mesh.normal[t[2]] * v, p.face_normal);
-  if (dot(p.site.normal, p.face_normal) <= 0) p.site.normal = p.face_normal;  // a normal that contradicts its face
-  return p;
-}
-
-/// The same place on the back of its face.
-MeshlessPoint behind(MeshlessPoint p) {
-  p.site.normal = -p.site.normal;
-  p.face_normal = -p.face_normal;
-  p.behind = true;
-  return p;
-}
-
 /// Equation 1.
 bool has_room(const PointGrid& grid, const std::vector<MeshlessPoint>& points, const SurfaceSite& at, float radius) {
   bool room = true;
@@ -116,6 +93,26 @@ bool is_enclosed(const Tracer& tracer, const GatherFaces& faces, const TransferP
   return both_sides ? side == HitSide::dark : side != HitSide::front;
 }
 
+MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2f& uv, bool groups_by_part, bool behind) {
+  const Mesh& mesh = scene.mesh;
+  const Triangle& t = mesh.triangles[triangle];
+  const float u = uv.x, v = uv.y, w = 1 - u - v;
+  MeshlessPoint p{.triangle = triangle, .u = u, .v = v};
+  p.site.position = mesh.position[t[0]] * w + mesh.position[t[1]] * u + mesh.position[t[2]] * v;
+  p.site.group = groups_by_part ? mesh.part[triangle] : 0;
+  p.face_normal = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
+  const Vec3f shading = mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]];
+  if (is_double_sided(scene, triangle) && dot(p.face_normal, shading) < 0) p.face_normal = -p.face_normal;
+  p.site.normal = normalized(mesh.normal[t[0]] * w + mesh.normal[t[1]] * u + mesh.normal[t[2]] * v, p.face_normal);
+  if (dot(p.site.normal, p.face_normal) <= 0) p.site.normal = p.face_normal;  // a normal that contradicts its face
+  if (behind) {
+    p.site.normal = -p.site.normal;
+    p.face_normal = -p.face_normal;
+    p.behind = true;
+  }
+  return p;
+}
+
 PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, const PointPlacement& asked,
                             Threads& threads) {
   const Scene& scene = tracer.scene();
@@ -139,8 +136,10 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
       if (k % 4096 == 0) threads.check();
       const std::uint32_t triangle = triangles.pick(random.uniform_double());
       const double a = random.uniform_double(), b = random.uniform_double();
-      MeshlessPoint p = point_on(scene, triangle, uniform_triangle({a, b}), params.groups_by_part);
-      if (both && is_double_sided(scene, triangle) && random.uniform() < 0.5F) p = behind(p);
+      const Vec2<double> uv = uniform_triangle({a, b});
+      const bool behind = both && is_double_sided(scene, triangle) && random.uniform() < 0.5F;
+      const MeshlessPoint p = point_on(scene, triangle, {static_cast<float>(uv.x), static_cast<float>(uv.y)},
+                                       params.groups_by_part, behind);
       if (!has_room(grid, out.points, p.site, radius)) continue;
       if (is_enclosed(tracer, faces, transfer_point(p), two_sided)) continue;
       grid.add(static_cast<std::uint32_t>(out.points.size()), p.site.position);

@@ -32,10 +32,11 @@ struct SurfaceSite {
 
 struct MeshlessPoint {
   SurfaceSite site;
-  Vec3f face_normal;  // on the side of the point
-  std::uint32_t triangle = 0;
+  Vec3f face_normal;           // on the side of the point
+  std::uint32_t triangle = 0;  // kNoFace: of a vertex (demand.h)
   float u = 0, v = 0;
   bool behind = false;  // on the back of a double-sided face
+  bool pocket = false;  // its normal's ray first meets a back (demand.h)
 };
 
 struct PointPlacement {
@@ -55,7 +56,10 @@ struct PointHierarchy {
   std::vector<std::uint32_t> level_end;  // level i has the points level_end[i - 1] .. level_end[i] - 1
   std::vector<float> radius;             // R of each level
 
+  bool demanded = false;  // the last level is one of points that were asked for (demand.h)
+
   std::size_t levels() const { return level_end.size(); }
+  std::size_t placed_levels() const { return levels() - (demanded ? 1 : 0); }
   std::uint32_t begin(std::size_t level) const { return level == 0 ? 0 : level_end[level - 1]; }
 };
 
@@ -67,6 +71,9 @@ PointPlacement resolve(const PointPlacement&, const Scene&);
 double expected_points(double area, double radius);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
+
+/// The point of a triangle at barycentrics (u, v) of corners 1 and 2; `behind`: on the back of the face.
+MeshlessPoint point_on(const Scene&, std::uint32_t triangle, const Vec2f& uv, bool groups_by_part, bool behind);
 
 /// Whether the first thing in the direction of the normal is a back (`both_sides`: of a single-sided face): the site is
 /// inside a solid.

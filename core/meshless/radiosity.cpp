@@ -6,8 +6,11 @@
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
-#include "core/meshless/basis.h"
+#include "core/meshless/anderson.h"
+#include "core/meshless/demand.h"
 #include "core/meshless/gather_rows.h"
+#include "core/meshless/point_grid.h"
+#include "core/meshless/reading.h"
 #include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 
@@ -15,49 +18,13 @@ namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 128;
-constexpr float kChildReach = 2;  // of the parent level's R: points that a flagged point sends for
+constexpr float kChildReach = 2;    // of the parent level's R: points that a flagged point sends for
+constexpr int kPlainSweeps = 4;     // from whose last two the factor is known by which light shrinks at a bounce
+constexpr double kFaintest = 0.01;  // at most this much of kTail may change in a sweep: some light shrinks slower
+constexpr double kRounding = 3e-7;  // of the light: sweeps change it no less
 
 double mean_of(const Vec3f& x) { return (double{x.x} + double{x.y} + double{x.z}) / 3; }
 float largest(const Vec3f& x) { return std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}); }
-
-/// Interpolation weights of many places: rows of a sparse matrix.
-class Stencils {
- public:
-  Stencils(const MeshlessBasis& basis, std::span<const SurfaceSite> places, Threads& threads)
-      : cover_(places.size()), begin_(places.size() + 1) {
-    std::vector<std::vector<BasisTerm>> found((places.size() + kBlock - 1) / kBlock);
-    threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      std::vector<BasisTerm>& own = found[begin / kBlock];
-      for (std::size_t i = begin; i < end; ++i) {
-        cover_[i] = basis.terms(places[i], basis.levels(), own);
-        begin_[i + 1] = own.size();
-      }
-    });
-    std::size_t total = 0;
-    for (std::size_t block = 0; block < found.size(); ++block) {
-      const std::size_t end = std::min(places.size(), (block + 1) * kBlock);
-      for (std::size_t i = block * kBlock; i < end; ++i) begin_[i + 1] += total;
-      total += found[block].size();
-    }
-    terms_.reserve(total);
-    for (const auto& own : found) terms_.insert(terms_.end(), own.begin(), own.end());
-  }
-  Cover cover(std::size_t i) const { return cover_[i]; }
-  template <class F>
-  void each(std::size_t i, const F& f) const {
-    for (std::size_t k = begin_[i]; k < begin_[i + 1]; ++k) f(terms_[k]);
-  }
-  Vec3f apply(std::size_t i, std::span<const Vec3f> values) const {
-    Vec3f sum;
-    each(i, [&](const BasisTerm& t) { sum += values[t.function] * t.value; });
-    return sum;
-  }
-
- private:
-  std::vector<Cover> cover_;
-  std::vector<std::size_t> begin_;
-  std::vector<BasisTerm> terms_;
-};
 
 class Solver {
  public:
@@ -70,7 +37,11 @@ class Solver {
         vertices_(vertex_points(tracer.scene().mesh)) {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     begin_stage("points");
-    out_.surface = std::make_unique<LitSurface>(tracer, sky, params.points, threads);
+    const std::vector<std::uint32_t> part = parts_of_vertices();
+    for (std::size_t v = 0; v < vertices_.size(); ++v) {
+      readers_.push_back({vertices_[v], params_.points.groups_by_part ? part[v] : 0});
+    }
+    out_.surface = std::make_unique<LitSurface>(tracer, sky, LitSurface::Points{params.points, readers_}, threads);
     for (const MeshlessPoint& p : points().points) {
       sites_.push_back(p.site);
       at_.push_back(transfer_point(p));
@@ -85,6 +56,7 @@ class Solver {
     for (std::size_t level = 0; level < points().levels(); ++level) {
       out_.stats.points.push_back(points().level_end[level] - points().begin(level));
     }
+    out_.stats.gathered.resize(points().levels());
     if (params_.bounces == 0) {
       out_.surface.reset();
       return std::move(out_);
@@ -134,55 +106,76 @@ class Solver {
       receiver_.push_back(points[i]);
       places.push_back(at_[points[i]]);
     }
-    rows_->add(places, false, threads_, out_.stats.gather_rays);
+    rows_->add(places, threads_, out_.stats.gather_rays);
     first_bounce_.resize(receiver_.size());
     threads_.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = first + begin; r < first + end; ++r) first_bounce_[r] = rows_->apply(r, direct_);
     });
-    out_.stats.gathered.push_back(static_cast<std::uint32_t>(points.size()));
+    for (const std::uint32_t p : points) ++out_.stats.gathered[level_of(p)];
   }
 
-  MeshlessBasis flattened(std::size_t receivers) const {
+  std::size_t level_of(std::uint32_t point) const {
+    const std::vector<std::uint32_t>& ends = points().level_end;
+    return static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), point) - ends.begin());
+  }
+
+  /// For what places read of the receivers so far.
+  Reading read_receivers() const {
     std::vector<SurfaceSite> some;
-    for (std::size_t r = 0; r < receivers; ++r) some.push_back(sites_[receiver_[r]]);
-    const std::uint32_t end[] = {static_cast<std::uint32_t>(receivers)};
-    return {some, end, threads_, params_.neighbours};
+    for (const std::uint32_t p : receiver_) some.push_back(sites_[p]);
+    return {tracer_, some, params_.neighbours, threads_};
+  }
+
+  std::vector<Readings::Place> places_of(std::uint32_t begin, std::uint32_t end) const {
+    std::vector<Readings::Place> places;
+    for (std::uint32_t p = begin; p < end; ++p) places.push_back({at_[p], sites_[p].group});
+    return places;
   }
 
   /// COMPUTE-BOUNCE's refinement, for all bounces at once.
   void gather_adaptively() {
-    std::size_t before = 0;  // receivers of the levels above the last one
+    const auto uniform = static_cast<std::size_t>(params_.uniform_levels);
+    std::size_t before = 0;             // receivers of the levels above the last one
+    std::optional<Readings> predicted;  // of the last level's points, from those receivers
     for (std::size_t level = 0; level < points().levels(); ++level) {
-      std::vector<std::uint32_t> chosen;
-      if (level < static_cast<std::size_t>(params_.uniform_levels)) {
-        for (std::uint32_t p = points().begin(level); p < points().level_end[level]; ++p) chosen.push_back(p);
-      } else {
-        chosen = children_of(mispredicted(before), level);
+      const std::uint32_t begin = points().begin(level), end = points().level_end[level];
+      const bool everywhere = level < uniform || level >= points().placed_levels();
+      std::vector<char> chosen(end - begin, everywhere ? 1 : 0);
+      std::optional<Readings> seen;
+      if (level + 1 >= uniform && level < points().placed_levels())
+        seen.emplace(read_receivers(), places_of(begin, end), threads_);
+      if (!everywhere) {
+        for (const std::uint32_t p : children_of(mispredicted(before, level - 1, *predicted), level))
+          chosen[p - begin] = 1;
+        for (std::size_t i = 0; i < chosen.size(); ++i) {
+          if (!seen->any(i)) chosen[i] = 1;
+        }
       }
       before = receiver_.size();
-      gather(std::move(chosen));
+      predicted = std::move(seen);
+      gather(marked(chosen, begin));
     }
   }
 
-  /// RECEIVER-ORACLE: points gathered last that those before them do not predict.
-  std::vector<std::uint32_t> mispredicted(std::size_t before) const {
+  static std::vector<std::uint32_t> marked(const std::vector<char>& marks, std::uint32_t first) {
+    std::vector<std::uint32_t> out;
+    for (std::uint32_t i = 0; i < marks.size(); ++i) {
+      if (marks[i] != 0) out.push_back(first + i);
+    }
+    return out;
+  }
+
+  /// RECEIVER-ORACLE: points gathered last, of `level`, that those before them do not predict.
+  std::vector<std::uint32_t> mispredicted(std::size_t before, std::size_t level, const Readings& predicted) const {
     double mean = 0;
     for (std::size_t r = 0; r < receiver_.size(); ++r) mean += mean_of(first_bounce_[r] + direct_[receiver_[r]]);
     const auto limit =
         static_cast<float>(params_.eps * mean / static_cast<double>(std::max<std::size_t>(1, receiver_.size())));
-    const MeshlessBasis coarser = flattened(before);
-    const std::span<const Vec3f> known(first_bounce_.data(), before);
-    std::vector<char> wrong(receiver_.size() - before);
-    threads_.for_blocks(wrong.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t r = before + i;
-        const Vec3f predicted = coarser.evaluate(known, sites_[receiver_[r]], 1);
-        wrong[i] = largest(first_bounce_[r] - predicted) > limit ? 1 : 0;
-      }
-    });
     std::vector<std::uint32_t> out;
-    for (std::size_t i = 0; i < wrong.size(); ++i) {
-      if (wrong[i] != 0) out.push_back(receiver_[before + i]);
+    for (std::size_t r = before; r < receiver_.size(); ++r) {
+      const std::size_t i = receiver_[r] - points().begin(level);
+      if (level > 0 && !predicted.any(i)) continue;  // of a pocket: finer points there that see nothing gather anyway
+      if (largest(first_bounce_[r] - predicted.apply(i, first_bounce_)) > limit) out.push_back(receiver_[r]);
     }
     return out;
   }
@@ -204,34 +197,44 @@ class Solver {
     return out;
   }
 
-  /// How senders and vertices get reflected light from the receivers, and rows for vertices that cannot.
+  /// How points and vertices get reflected light from the receivers. Points that see none gather for themselves, and
+  /// so do vertices that see no point at all.
   void prepare_reading() {
-    const MeshlessBasis basis = flattened(receiver_.size());
-    at_senders_.emplace(basis, sites_, threads_);
-    std::vector<SurfaceSite> places;
-    const std::vector<std::uint32_t> part = parts_of_vertices();
-    for (std::size_t v = 0; v < vertices_.size(); ++v) {
-      const TransferPoint& p = vertices_[v];
-      places.push_back({p.position, p.normal, params_.points.groups_by_part ? part[v] : 0});
+    const auto all = static_cast<std::uint32_t>(sites_.size());
+    for (int round = 0; round < 2; ++round) {
+      const Reading reading = read_receivers();
+      at_points_.emplace(reading, places_of(0, all), threads_);
+      at_vertices_.emplace(reading, readers_, threads_);
+      if (gather_unseen() == 0) break;
     }
-    at_vertices_.emplace(basis, places, threads_);
-    enum Reading : char { interpolated, own_row, enclosed };
-    std::vector<char> reading(vertices_.size());
+    receiver_of_.assign(all, kNoReceiver);
+    for (std::uint32_t r = 0; r < receiver_.size(); ++r) receiver_of_[receiver_[r]] = r;
+
+    nearest_.assign(vertices_.size(), Senders::kNone);
+    const float radius = points().radius.empty() ? 0.0F : points().radius.back();
     for_each(vertices_.size(), [&](std::size_t v) {
-      reading[v] = is_enclosed(tracer_, out_.surface->faces(), vertices_[v]) ? enclosed
-                   : at_vertices_->cover(v) != Cover::functions              ? own_row
-                                                                             : interpolated;
+      if (at_vertices_->any(v)) return;
+      nearest_[v] = out_.surface->paths().world().senders.nearest(reader_site(readers_[v], radius));
     });
-    for (const Reading kind : {own_row, enclosed}) {
-      std::vector<TransferPoint> own;
-      for (std::uint32_t v = 0; v < reading.size(); ++v) {
-        if (reading[v] != kind) continue;
-        alone_.push_back(v);
-        own.push_back(vertices_[v]);
-      }
-      rows_->add(own, kind == enclosed, threads_, out_.stats.gather_rays);
+    std::vector<TransferPoint> own;
+    for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
+      if (at_vertices_->any(v) || nearest_[v] != Senders::kNone) continue;
+      alone_.push_back(v);
+      own.push_back(vertices_[v]);
     }
+    first_alone_ = rows_->size();
+    rows_->add(own, threads_, out_.stats.gather_rays);
     out_.stats.alone = alone_.size();
+  }
+
+  /// Points that neither gather nor see one that does.
+  std::size_t gather_unseen() {
+    std::vector<char> unseen(sites_.size());
+    for (std::size_t p = 0; p < unseen.size(); ++p) unseen[p] = at_points_->any(p) ? 0 : 1;
+    for (const std::uint32_t p : receiver_) unseen[p] = 0;
+    const std::vector<std::uint32_t> found = marked(unseen, 0);
+    if (!found.empty()) gather(found);
+    return found.size();
   }
 
   std::vector<std::uint32_t> parts_of_vertices() const {
@@ -243,10 +246,11 @@ class Solver {
     return part;
   }
 
-  /// The Neumann series i_{k+1} = c + T (e + i_k), and the reading of its limit at vertices.
+  /// The Neumann series i_{k+1} = c + T (e + i_k), mixed after its first terms, and the reading of its limit.
   void iterate() {
     std::vector<Vec3f> gathered(receiver_.size()), next(receiver_.size()), total = direct_;
-    double before = 0, ratio_before = 0;
+    AndersonMixing mixing;
+    double before = 0, ratio = 0;
     const bool automatic = params_.bounces < 0;
     const int most = automatic ? kMostSweeps : params_.bounces;
     for (int sweep = 0; sweep < most; ++sweep) {
@@ -254,43 +258,55 @@ class Solver {
       for_each(next.size(), [&](std::size_t r) { next[r] = rows_->apply(r, total); });
       double change = 0, light = 0;
       for (std::size_t r = 0; r < next.size(); ++r) {
-        change += mean_of(next[r] - gathered[r]);
+        const Vec3f d = next[r] - gathered[r];
+        change += (std::abs(double{d.x}) + std::abs(double{d.y}) + std::abs(double{d.z})) / 3;
         light += mean_of(next[r]) + mean_of(direct_[receiver_[r]]);
       }
-      const double ratio = before > 0 ? change / before : 0;
-      if (params_.bounces < 0 && ratio > 0 && ratio < 1 && std::abs(ratio - ratio_before) < 0.02 * (1 - ratio)) {
-        // A steady factor: what is to come is a geometric series.
-        const auto rest = static_cast<float>(ratio / (1 - ratio));
-        for (std::size_t r = 0; r < next.size(); ++r) next[r] += (next[r] - gathered[r]) * rest;
-        before = ratio_before = 0;
-      } else {
-        before = change, ratio_before = ratio;
-      }
-      std::swap(gathered, next);
       out_.stats.sweeps = sweep + 1;
-      if (params_.bounces < 0 && std::abs(change) <= kTail * light * (1 - std::min(ratio, 0.9999))) break;
+      const bool plain = !automatic || sweep < kPlainSweeps;
+      if (plain) ratio = before > 0 ? std::min(1.0, change / before) : 0;
+      before = change;
+      const bool done = automatic && change <= light * std::max(kRounding, kTail * std::min(1 - ratio, kFaintest));
+      if (plain || done) {
+        std::swap(gathered, next);
+      } else {
+        gathered = mixing.next(gathered, next);
+        for (Vec3f& x : gathered) x = {std::max(0.0F, x.x), std::max(0.0F, x.y), std::max(0.0F, x.z)};
+      }
+      if (done) break;
     }
     if (automatic) spread(gathered, total);
-    if (params_.vector) {
-      std::vector<VectorValue> turned(receiver_.size());
-      for_each(turned.size(), [&](std::size_t r) { turned[r] = rows_->apply_vector(r, at_[receiver_[r]], total); });
-      // The sweeps' own value, to which the rest of the series may have been added.
-      for_each(turned.size(), [&](std::size_t r) { turned[r].value = gathered[r]; });
-      for_each(vertices_.size(), [&](std::size_t v) {
-        at_vertices_->each(
-            v, [&](const BasisTerm& t) { out_.indirect[v] += turned[t.function].at(vertices_[v].normal) * t.value; });
-      });
-    } else {
-      for_each(vertices_.size(), [&](std::size_t v) { out_.indirect[v] = at_vertices_->apply(v, gathered); });
-    }
-    for_each(alone_.size(),
-             [&](std::size_t i) { out_.indirect[alone_[i]] = rows_->apply(receiver_.size() + i, total); });
+    read_vertices(gathered, total);
     out_.surface->set_light(std::move(total));
   }
 
-  /// Direct and reflected light at all senders.
+  /// Reflected light of the vertices, turned to their normals.
+  void read_vertices(const std::vector<Vec3f>& gathered, const std::vector<Vec3f>& total) {
+    std::vector<VectorValue> turned(receiver_.size());
+    for_each(turned.size(), [&](std::size_t r) {
+      if (params_.vector) turned[r] = rows_->apply_vector(r, at_[receiver_[r]], total);
+      turned[r].value = gathered[r];  // the sweeps' own, to which the rest of the series may have been added
+    });
+    for_each(vertices_.size(), [&](std::size_t v) {
+      const Vec3f& normal = vertices_[v].normal;
+      const auto read = [&](std::span<const BasisTerm> terms) {
+        for (const BasisTerm& t : terms) out_.indirect[v] += turned[t.function].at(normal) * t.value;
+      };
+      const std::uint32_t nearest = nearest_[v];
+      if (nearest == Senders::kNone) {
+        read(at_vertices_->terms(v));
+      } else if (receiver_of_[nearest] != kNoReceiver) {
+        out_.indirect[v] = turned[receiver_of_[nearest]].at(normal);
+      } else {
+        read(at_points_->terms(nearest));
+      }
+    });
+    for_each(alone_.size(), [&](std::size_t i) { out_.indirect[alone_[i]] = rows_->apply(first_alone_ + i, total); });
+  }
+
+  /// Direct and reflected light at all points.
   void spread(const std::vector<Vec3f>& gathered, std::vector<Vec3f>& total) {
-    for_each(total.size(), [&](std::size_t s) { total[s] = direct_[s] + at_senders_->apply(s, gathered); });
+    for_each(total.size(), [&](std::size_t s) { total[s] = direct_[s] + at_points_->apply(s, gathered); });
     for_each(receiver_.size(), [&](std::size_t r) { total[receiver_[r]] = direct_[receiver_[r]] + gathered[r]; });
   }
 
@@ -306,14 +322,19 @@ class Solver {
   Threads& threads_;
   DirectLight light_, rough_light_;  // at vertices, at points
   std::vector<TransferPoint> vertices_;
-  std::vector<SurfaceSite> sites_;  // of the points
+  std::vector<Readings::Place> readers_;  // the same, with their groups
+  std::vector<SurfaceSite> sites_;        // of the points
   std::vector<TransferPoint> at_;
   std::optional<GatherRows> rows_;       // of the receivers, then of `alone_`
   std::vector<Vec3f> direct_;            // at the points
   std::vector<std::uint32_t> receiver_;  // the point of each row
   std::vector<Vec3f> first_bounce_;      // at the receivers
-  std::optional<Stencils> at_senders_, at_vertices_;
-  std::vector<std::uint32_t> alone_;  // vertices
+  std::optional<Readings> at_points_, at_vertices_;
+  static constexpr std::uint32_t kNoReceiver = 0xffffffffU;
+  std::vector<std::uint32_t> receiver_of_;  // of each point
+  std::vector<std::uint32_t> nearest_;      // the point that a vertex reads which sees no receiver, or Senders::kNone
+  std::vector<std::uint32_t> alone_;        // vertices with rows of their own
+  std::size_t first_alone_ = 0;             // of the rows
   RadiosityResult out_;
 };
 

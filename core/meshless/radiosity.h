@@ -12,8 +12,7 @@
 //    one level of the Shepard basis (basis.h), radii by k nearest neighbours of whatever density is there. What a
 //    vertex reads is first turned to its normal (vector irradiance, VectorValue of gather_rows.h);
 //  - vertices inside solids, and those that no function reaches, have rows of their own.
-// Bounces until what is left is below kTail of the light, or as many as asked for. When the sweeps' differences shrink
-//         by a steady factor the rest of the series is added as a geometric one.
+// Bounces until what is left is below kTail of the light, by mixed sweeps (anderson.h); or as many as asked for.
 // Units   W m^-2 sr^-1 (value = irradiance / pi: what a white vertex radiates)
 // Cost    see README.md.   Memory  12 bytes a gathering ray, about 200 a point and 100 a vertex
 // Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if stopped

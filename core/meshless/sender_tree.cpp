@@ -6,6 +6,7 @@
 
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/meshless/in_sight.h"
 #include "core/meshless/point_grid.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -22,8 +23,7 @@ struct Draw {
   std::uint32_t sender = Senders::kNone;
 };
 
-Draw draw_place(const SenderPaths::World& world, const std::vector<double>& cumulative, const SenderPaths& paths,
-                Random random) {
+Draw draw_place(const SenderPaths::World& world, const std::vector<double>& cumulative, Random random) {
   const Scene& scene = world.tracer.scene();
   const Mesh& mesh = scene.mesh;
   const double pick = random.uniform_double() * cumulative.back();
@@ -51,7 +51,7 @@ Draw draw_place(const SenderPaths::World& world, const std::vector<double>& cumu
       two_sided && back ? world.senders.behind(triangle, u, v) : world.senders.at(triangle, u, v);
   if (nearest == Senders::kNone || is_enclosed(world.tracer, world.faces, point, true)) return out;
   site.group = world.senders.site(nearest).group;
-  out.sender = paths.seen_sender(site, nearest);
+  out.sender = nearest;
   return out;
 }
 
@@ -66,7 +66,7 @@ SenderSamples sample_senders(const SenderPaths& paths, const PointHierarchy& poi
   for (const Triangle& t : mesh.triangles) cumulative.push_back(sum += triangle_area(mesh, t));
   std::vector<Draw> drawn(sum > 0 ? senders * kDrawn : 0);
   threads.for_blocks(drawn.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) drawn[i] = draw_place(paths.world(), cumulative, paths, Random(seed, i));
+    for (std::size_t i = begin; i < end; ++i) drawn[i] = draw_place(paths.world(), cumulative, Random(seed, i));
   });
   SenderSamples out;
   out.area.assign(senders, 0);

@@ -1,16 +1,18 @@
 #include "core/meshless/senders.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "core/mesh/topology.h"
+#include "core/meshless/in_sight.h"
 
 namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 1024;
-constexpr float kReach = 2;            // of R
-constexpr std::size_t kMostAsked = 8;  // of those within reach
+constexpr std::size_t kMostAsked = 2 * kPacket;  // of those within reach: in folds the nearest are hidden
 
 bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
@@ -30,15 +32,14 @@ Vec2f from_uv(std::uint8_t corner, float u, float v) {
 
 }  // namespace
 
-Senders::Senders(const Scene& scene, const PointHierarchy& points, const PointPlacement& placement, Threads& threads)
-    : scene_(scene),
+Senders::Senders(const Tracer& tracer, const PointHierarchy& points, const PointPlacement& placement, Threads& threads)
+    : tracer_(tracer),
+      scene_(tracer.scene()),
       points_(points),
       groups_by_part_(placement.groups_by_part),
-      both_sides_(placement.both_sides > 0),
       finest_(points.radius.empty() ? 1.0F : points.radius.back()),
       grid_(2 * finest_) {
-  for (std::uint32_t i = 0; i < points.points.size(); ++i) grid_.add(i, points.points[i].site.position);
-  const std::size_t triangles = scene.mesh.triangles.size();
+  const std::size_t triangles = scene_.mesh.triangles.size();
   faces_.resize(triangles);
   std::uint32_t cells = 0;
   for (std::uint32_t t = 0; t < triangles; ++t) {
@@ -47,9 +48,19 @@ Senders::Senders(const Scene& scene, const PointHierarchy& points, const PointPl
     cells += std::uint32_t{faces_[t].columns} * faces_[t].rows;
   }
   cells_.assign(cells, kNone);
-  if (both_sides_) back_cells_.assign(cells, kNone);
-  threads.for_blocks(triangles, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) fill(t);
+  add_new(threads);
+}
+
+void Senders::add_new(Threads& threads) {
+  PointGrid fresh(2 * finest_);
+  for (auto i = static_cast<std::uint32_t>(grid_.size()); i < points_.points.size(); ++i) {
+    grid_.add(i, points_.points[i].site.position);
+    fresh.add(i, points_.points[i].site.position);
+    backs_ = backs_ || points_.points[i].behind;
+  }
+  if (backs_) back_cells_.resize(cells_.size(), kNone);
+  threads.for_blocks(faces_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) fill(t, fresh);
   });
 }
 
@@ -72,27 +83,57 @@ Senders::Face Senders::cut(std::uint32_t triangle) const {
   return fewest <= kMostCells * (1 + area / (finest_ * finest_)) ? best : Face{};
 }
 
-void Senders::fill(std::uint32_t triangle) {
+void Senders::fill(std::uint32_t triangle, const PointGrid& fresh) {
   const Face& f = faces_[triangle];
+  const bool back = backs_ && is_double_sided(scene_, triangle);
   for (std::uint32_t j = 0; j < f.rows; ++j) {
     for (std::uint32_t i = 0; i < f.columns; ++i) {
-      float a = (static_cast<float>(i) + 0.5F) / f.columns, b = (static_cast<float>(j) + 0.5F) / f.rows;
-      if (const float sum = a + b; sum > 1) {
-        if (static_cast<float>(i) / f.columns + static_cast<float>(j) / f.rows >= 1) break;  // outside, as all to come
-        a /= sum, b /= sum;
-      }
-      const Vec2f uv = to_uv(f.corner, a, b);
-      SurfaceSite site = site_on(triangle, uv.x, uv.y);
+      if (i * f.rows + j * f.columns >= std::uint32_t{f.columns} * f.rows) break;  // outside, as all to come
       const std::uint32_t cell = f.begin + j * f.columns + i;
-      cells_[cell] = nearest(site);
-      if (!both_sides_ || !is_double_sided(scene_, triangle)) continue;
-      site.normal = -site.normal;
-      back_cells_[cell] = nearest(site);
+      const bool open = cells_[cell] >= kLook || (back && back_cells_[cell] >= kLook);
+      if (!open || !any_near(fresh, site_in_cell(triangle, i, j, {0.5F, 0.5F}).position)) continue;
+      if (cells_[cell] >= kLook) cells_[cell] = answer_of_cell(triangle, i, j, false);
+      if (back && back_cells_[cell] >= kLook) back_cells_[cell] = answer_of_cell(triangle, i, j, true);
     }
   }
 }
 
-SurfaceSite Senders::site_on(std::uint32_t triangle, float u, float v) const {
+bool Senders::any_near(const PointGrid& grid, const Vec3f& place) const {
+  bool any = false;
+  grid.near(place, kReach * finest_, [&](std::uint32_t, float) { any = true; });
+  return any;
+}
+
+/// The place at (x, y) of a cell, each from 0 to 1.
+SurfaceSite Senders::site_in_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, const Vec2f& at) const {
+  const Face& f = faces_[triangle];
+  float a = (static_cast<float>(i) + at.x) / f.columns, b = (static_cast<float>(j) + at.y) / f.rows;
+  if (const float sum = a + b; sum > 1) a /= sum, b /= sum;
+  const Vec2f uv = to_uv(f.corner, a, b);
+  return site_on(triangle, uv.x, uv.y, false);
+}
+
+std::uint32_t Senders::answer_of_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, bool back) const {
+  constexpr std::array<Vec2f, 4> kCorners = {{{0.1F, 0.1F}, {0.9F, 0.1F}, {0.1F, 0.9F}, {0.9F, 0.9F}}};
+  constexpr float kSmall = 0.5F;  // of R: cells no longer are not looked at more closely
+  const auto site = [&](const Vec2f& at) {
+    SurfaceSite s = site_in_cell(triangle, i, j, at);
+    if (back) s.normal = -s.normal;
+    return s;
+  };
+  const Search found = search(site({0.5F, 0.5F}));
+  if (found.sender == kNone) return found.any ? kLook : kNone;
+  std::array<SurfaceSite, kCorners.size()> corners;
+  float longest = 0;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    corners[k] = site(kCorners[k]);
+    longest = std::max(longest, length(corners[k].position - corners[0].position));
+  }
+  if (longest <= kSmall * finest_) return found.sender;
+  return in_sight(tracer_, this->site(found.sender), corners) == (1U << corners.size()) - 1 ? found.sender : kLook;
+}
+
+SurfaceSite Senders::site_on(std::uint32_t triangle, float u, float v, bool back) const {
   const Mesh& mesh = scene_.mesh;
   const Triangle& t = mesh.triangles[triangle];
   SurfaceSite site;
@@ -100,61 +141,56 @@ SurfaceSite Senders::site_on(std::uint32_t triangle, float u, float v) const {
   site.normal = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
   const Vec3f shading = mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]];
   if (is_double_sided(scene_, triangle) && dot(site.normal, shading) < 0) site.normal = -site.normal;
+  if (back) site.normal = -site.normal;
   site.group = groups_by_part_ ? mesh.part[triangle] : 0;
   return site;
 }
 
-std::uint32_t Senders::nearest(const SurfaceSite& at) const {
-  std::uint32_t best = kNone;
-  for (const float reach : {finest_, kReach * finest_}) {
-    float least = reach * reach;  // of d^2 / cos^2
-    grid_.near(at.position, reach, [&](std::uint32_t i, float d2) {
-      const SurfaceSite& q = points_.points[i].site;
-      const float cosine = dot(q.normal, at.normal);
-      if (q.group != at.group || cosine <= 0 || d2 > least * cosine * cosine) return;
-      const float scaled = d2 / (cosine * cosine);
-      if (scaled < least || i < best) best = i, least = std::min(least, scaled);
-    });
-    if (best != kNone) return best;
-  }
-  return kNone;
-}
-
-std::uint32_t Senders::nearest(const SurfaceSite& at, const std::function<bool(std::uint32_t)>& suits) const {
-  struct Candidate {
-    float scaled;
-    std::uint32_t point;
-  };
-  std::vector<Candidate> found;
-  const float reach = kReach * finest_;
+/// The points within `reach` of a site in order, by equation 1, of which `most` are kept.
+template <std::size_t most>
+std::size_t Senders::near(const SurfaceSite& at, float reach, std::array<Candidate, most>& first) const {
+  std::size_t count = 0;
   grid_.near(at.position, reach, [&](std::uint32_t i, float d2) {
     const SurfaceSite& q = points_.points[i].site;
     const float cosine = dot(q.normal, at.normal);
     if (q.group != at.group || cosine <= 0 || d2 > reach * reach * cosine * cosine) return;
-    found.push_back({d2 / (cosine * cosine), i});
+    const Candidate c{d2 / (cosine * cosine), i};
+    if (count == most && !(c < first.back())) return;
+    std::size_t k = count < most ? count++ : most - 1;
+    for (; k > 0 && c < first[k - 1]; --k) first[k] = first[k - 1];
+    first[k] = c;
   });
-  std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
-    return a.scaled != b.scaled ? a.scaled < b.scaled : a.point < b.point;
-  });
-  if (found.size() > kMostAsked) found.resize(kMostAsked);
-  for (const Candidate& c : found) {
-    if (suits(c.point)) return c.point;
+  return count;
+}
+
+std::uint32_t Senders::nearest(const SurfaceSite& at) const { return search(at).sender; }
+
+Senders::Search Senders::search(const SurfaceSite& at) const {
+  std::array<Candidate, kMostAsked> first;
+  std::size_t count = near(at, finest_, first);
+  if (count > 0 && in_sight(tracer_, at, site(first[0].point))) return {first[0].point, true};
+  count = near(at, kReach * finest_, first);
+  for (std::size_t k = 0; k < count; k += kPacket) {
+    std::array<SurfaceSite, kPacket> sites;
+    const std::size_t some = std::min<std::size_t>(kPacket, count - k);
+    for (std::size_t i = 0; i < some; ++i) sites[i] = site(first[k + i].point);
+    const std::uint32_t seen = in_sight(tracer_, at, std::span(sites).first(some));
+    if (seen != 0) return {first[k + static_cast<std::size_t>(std::countr_zero(seen))].point, true};
   }
-  return kNone;
+  return {kNone, count > 0};
 }
 
 std::uint32_t Senders::at(std::uint32_t triangle, float u, float v) const {
   const Face& f = faces_[triangle];
-  return f.columns == 0 ? nearest(site_on(triangle, u, v)) : cells_[cell_at(f, u, v)];
+  const std::uint32_t known = f.columns == 0 ? kLook : cells_[cell_at(f, u, v)];
+  return known == kLook ? nearest(site_on(triangle, u, v, false)) : known;
 }
 
 std::uint32_t Senders::behind(std::uint32_t triangle, float u, float v) const {
-  if (!both_sides_) return kNone;
+  if (!backs_) return kNone;
   const Face& f = faces_[triangle];
-  if (f.columns > 0) return back_cells_[cell_at(f, u, v)];
-  SurfaceSite site = site_on(triangle, u, v);
-  site.normal = -site.normal;
-  return nearest(site);
+  const std::uint32_t known = f.columns == 0 ? kLook : back_cells_[cell_at(f, u, v)];
+  return known == kLook ? nearest(site_on(triangle, u, v, true)) : known;
 }
 
 std::uint32_t Senders::cell_at(const Face& f, float u, float v) const {

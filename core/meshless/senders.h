@@ -1,23 +1,24 @@
 #pragma once
-// Which point stands for the light that leaves a place: the nearest one, by table.
+// Which point stands for the light that leaves a place: the nearest one that the place sees, by table.
 // Nearest  by the distance of equation 1 of points.h, |x - x_q| / (n . n_q): a point round a sharp corner is far.
-// Reach    2 R of the finest level: farther points do not answer. Such places (inside solids, where points were
-//          refused) have no sender, and light there must be followed by paths.
-// Table    each triangle is cut into cells of at most R x R along two of its edges, and a cell answers once for all, as
-//          at its centre: a hit costs one read. Only triangles for which that takes far more cells than their area
-//          deserves (blunt needles) are looked up.
-// Backs    of double-sided faces have cells of their own where points stand on both sides.
+// Sight    in_sight.h: what a wall or a fold of cloth parts does not answer for what is behind it.
+// Reach    2 R of the finest level: farther points do not answer, nor do more than the 32 nearest of those within
+// reach. Places without a sender must be followed by paths. Table    each triangle is cut into cells of at most R x R
+// along two of its edges, and a cell answers once for all, as
+//          at its centre: a hit costs one read. Where the centre's answer is not seen from near the cell's corners, and
+//          on triangles for which cells take far more than their area deserves (blunt needles), each hit looks for
+//          itself.
+// Backs    of double-sided faces have cells of their own where points stand on some.
 // Memory   12 bytes a triangle, 4 a cell: about three cells a point
 // Repeat   a pure function of its arguments: of two equally near points the first counts
 
+#include <array>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "core/base/threads.h"
 #include "core/meshless/point_grid.h"
 #include "core/meshless/points.h"
-#include "core/prt/ray_origin.h"
 #include "core/scene/scene.h"
 
 namespace kiln {
@@ -25,22 +26,22 @@ namespace kiln {
 class Senders {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffU;
+  static constexpr float kReach = 2;  // of R
 
-  /// Keeps references to both.
-  Senders(const Scene&, const PointHierarchy&, const PointPlacement&, Threads&);
+  /// Keeps references to tracer and points.
+  Senders(const Tracer&, const PointHierarchy&, const PointPlacement&, Threads&);
 
-  /// The point nearest to a site, or kNone.
+  /// Takes in points that were added to the hierarchy behind those known so far: they answer where none did.
+  void add_new(Threads&);
+
+  /// The nearest point within reach that the site sees, or kNone.
   std::uint32_t nearest(const SurfaceSite&) const;
-  /// The nearest within reach that `suits`, or kNone. Asks nearer ones first, eight at most.
-  std::uint32_t nearest(const SurfaceSite&, const std::function<bool(std::uint32_t)>& suits) const;
   /// The same at a hit on the lit side of a face.
   std::uint32_t at(std::uint32_t triangle, float u, float v) const;
   /// The same on the back of a double-sided face; kNone where no points stand on backs.
   std::uint32_t behind(std::uint32_t triangle, float u, float v) const;
   const SurfaceSite& site(std::uint32_t sender) const { return points_.points[sender].site; }
   void prefetch(std::uint32_t triangle) const { __builtin_prefetch(&faces_[triangle]); }
-  /// Where rays of a sender start.
-  Vec3f origin(std::uint32_t sender) const { return ray_origin(transfer_point(points_.points[sender])); }
 
  private:
   /// Cells (i, j) of a triangle along the edges from `corner` to the next and to the one before it.
@@ -50,13 +51,32 @@ class Senders {
     std::uint8_t corner = 0;
   };
   Face cut(std::uint32_t triangle) const;
-  void fill(std::uint32_t triangle);
-  SurfaceSite site_on(std::uint32_t triangle, float u, float v) const;
+  /// An answer, and whether there was any point to ask.
+  struct Search {
+    std::uint32_t sender = kNone;
+    bool any = false;
+  };
+  struct Candidate {
+    float scaled = 0;  // d^2 / cos^2
+    std::uint32_t point = kNone;
+    bool operator<(const Candidate& o) const { return scaled != o.scaled ? scaled < o.scaled : point < o.point; }
+  };
+  void fill(std::uint32_t triangle, const PointGrid& fresh);
+  bool any_near(const PointGrid&, const Vec3f&) const;
+  SurfaceSite site_in_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, const Vec2f& at) const;
+  std::uint32_t answer_of_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, bool back) const;
+  template <std::size_t most>
+  std::size_t near(const SurfaceSite&, float reach, std::array<Candidate, most>& first) const;
+  Search search(const SurfaceSite&) const;
+  SurfaceSite site_on(std::uint32_t triangle, float u, float v, bool back) const;
   std::uint32_t cell_at(const Face&, float u, float v) const;
 
+  static constexpr std::uint32_t kLook = 0xfffffffeU;  // of a cell: each hit looks for itself
+
+  const Tracer& tracer_;
   const Scene& scene_;
   const PointHierarchy& points_;
-  bool groups_by_part_, both_sides_;
+  bool groups_by_part_, backs_ = false;
   float finest_ = 0;
   PointGrid grid_;
   std::vector<Face> faces_;

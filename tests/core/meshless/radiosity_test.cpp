@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "core/meshless/anderson.h"
+#include "core/meshless/demand.h"
 #include "core/meshless/gather_rows.h"
 #include "core/meshless/senders.h"
 #include "core/prt/ray_origin.h"
@@ -149,8 +152,8 @@ TEST(Radiosity, AgreesWithThePathEstimatorUnderASky) {
 }
 
 TEST(Radiosity, FollowsLightOnBacksOfDoubleSidedFaces) {
-  // A floor faces the back of a double-sided sheet that a lamp below the floor's level lights: no point stands on that
-  // side, so paths must carry it.
+  // A floor faces the back of a double-sided sheet that a lamp lights: no point is placed on that side, so some must be
+  // asked for.
   Scene scene = testing::empty_scene();
   const std::uint32_t sheet = testing::add_part(scene, {0.8F, 0.8F, 0.8F}, true);
   const std::uint32_t lamp = add_lit_part(scene, {0, 0, 0}, {5, 5, 5});
@@ -159,8 +162,8 @@ TEST(Radiosity, FollowsLightOnBacksOfDoubleSidedFaces) {
   testing::add_grid(scene, {-0.45F, -0.2F, 0.45F}, {0.1F, 0, 0}, {0, 0, -0.9F}, 1, 1, lamp);  // shines up
   const RadiosityResult r = solve(scene, {});
   EXPECT_GT(r.indirect[12].x, 0.05F);  // the floor's middle
-  // .028 was measured: 512 paths a vertex of two shadow rays each, after a bounce.
-  EXPECT_LT(error_against_paths(scene, r, nullptr, 8192), 0.034);
+  // .035 was measured: eight shadow rays a point, near a lamp narrower than the points are apart.
+  EXPECT_LT(error_against_paths(scene, r, nullptr, 8192), 0.042);
 }
 
 TEST(Radiosity, OfVerticesInsideASolidIsDark) {
@@ -169,7 +172,6 @@ TEST(Radiosity, OfVerticesInsideASolidIsDark) {
   testing::add_grid(scene, {-0.02F, 0.4F, 0.02F}, {0.04F, 0, 0}, {0, 0, -0.04F}, 2, 2);
   testing::add_box(scene, {-0.05F, 0.38F, -0.05F}, {0.05F, 0.45F, 0.05F}, 2, false);  // around the little sheet
   const RadiosityResult r = solve(scene, {});
-  EXPECT_GE(r.stats.alone, 9U);
   for (std::size_t v = first; v < first + 9; ++v) EXPECT_EQ(r.direct[v] + r.indirect[v], Vec3f{});
 }
 
@@ -196,6 +198,37 @@ TEST(Radiosity, HardlyLeaksThroughAThinWall) {
   const double leak = leak_of({});
   std::printf("leak %.5f\n", leak);
   EXPECT_LT(leak, 1e-3);
+}
+
+/// A room that a curtain parts: a zigzag of double-sided strips, much narrower than points are apart. The lamp is on
+/// its left.
+Scene curtain_room(float lamp_radiance) {
+  Scene scene = testing::empty_scene();
+  const std::uint32_t grey = testing::add_part(scene, {0.7F, 0.7F, 0.7F});
+  const std::uint32_t cloth = testing::add_part(scene, {0.6F, 0.6F, 0.6F}, true);
+  testing::add_box(scene, {-0.4F, -0.25F, -0.25F}, {0.4F, 0.25F, 0.25F}, 12, true, grey);
+  constexpr int kFolds = 50;
+  for (int i = 0; i < kFolds; ++i) {
+    const float z = -0.25F + 0.5F * static_cast<float>(i) / kFolds, x = i % 2 == 0 ? -0.006F : 0.006F;
+    testing::add_grid(scene, {x, -0.25F, z}, {0, 0.5F, 0}, {-2 * x, 0, 0.5F / kFolds}, 10, 1, cloth);
+  }
+  const std::uint32_t lamp = add_lit_part(scene, {0, 0, 0}, Vec3f{1, 1, 1} * lamp_radiance);
+  testing::add_grid(scene, {-0.25F, 0.24F, -0.05F}, {0.1F, 0, 0}, {0, 0, 0.1F}, 1, 1, lamp);
+  return scene;
+}
+
+TEST(Radiosity, OfAClothInFoldsAgreesWithThePathEstimator) {
+  const Scene scene = curtain_room(5);
+  const RadiosityResult r = solve(scene, {.points = {.wanted = 3000}});
+  // .116 was measured, of folds whose light changes within .01 while points are .02 apart.
+  EXPECT_LT(error_against_paths(scene, r, nullptr, 512), 0.14);
+  double lit = 0, dark = 0;
+  for (std::size_t v = 0; v < scene.mesh.position.size(); ++v) {
+    const float x = scene.mesh.position[v].x, light = r.direct[v].x + r.indirect[v].x;
+    if (x < -0.01F) lit = std::max(lit, double{light});
+    if (x > 0.01F) dark = std::max(dark, double{light});
+  }
+  EXPECT_LT(dark, 1e-3 * lit);  // behind the curtain
 }
 
 TEST(Radiosity, IsTheSameForAnyThreadCount) {
@@ -279,13 +312,13 @@ TEST(GatherRows, KnowFromWhichSideLightComes) {
   const GatherFaces faces(scene);
   const HitAlbedo albedo(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 8000}, threads);
-  const Senders senders(scene, h, PointPlacement{}, threads);
+  const Senders senders(tracer, h, PointPlacement{}, threads);
   const DirectLight dark(tracer, nullptr, {});
   const SenderPaths paths({tracer, faces, albedo, senders, &dark});
   GatherRows rows(paths, 4096, 3);
   const TransferPoint middle{{0, 0, 0}, {0, 1, 0}, {0, 0, 0}, {0, 1, 0}};
   std::uint64_t rays = 0;
-  rows.add(std::span(&middle, 1), false, threads, rays);
+  rows.add(std::span(&middle, 1), threads, rays);
   EXPECT_EQ(rays, 4096U);
   std::vector<Vec3f> light(h.points.size());
   for (std::size_t i = 0; i < light.size(); ++i) light[i] = h.points[i].site.position.x > 0 ? Vec3f{1, 1, 1} : Vec3f{};
@@ -299,13 +332,85 @@ TEST(GatherRows, KnowFromWhichSideLightComes) {
   EXPECT_GT(v.at(normalized(Vec3f{0.2F, 1, 0})).x, v.value.x * 1.1F);
 }
 
+TEST(Senders, DoNotAnswerThroughAWall) {
+  // Two floors at one height, a wall between them that is thinner than the table's cells: who answers for a place
+  // stands on its own side.
+  Scene scene = testing::empty_scene();
+  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 3, 3);
+  testing::add_box(scene, {0.0995F, 0, -0.5F}, {0.1005F, 0.5F, 0.5F}, 1, false);
+  Threads threads(2);
+  const Tracer tracer(scene, threads);
+  const PointHierarchy h = place_points(tracer, GatherFaces(scene), {.wanted = 600}, threads);
+  ASSERT_GT(h.radius.back(), 0.02F);
+  const Senders senders(tracer, h, PointPlacement{}, threads);
+  for (std::uint32_t i = 0; i < 4000; ++i) {
+    Random random(22, i);
+    const auto t = static_cast<std::uint32_t>(random.next() % 18);
+    const Vec2<double> uv = uniform_triangle({random.uniform_double(), random.uniform_double()});
+    const auto u = static_cast<float>(uv.x), v = static_cast<float>(uv.y);
+    const auto& [a, b, c] = scene.mesh.triangles[t];
+    const Vec3f x = scene.mesh.position[a] * (1 - u - v) + scene.mesh.position[b] * u + scene.mesh.position[c] * v;
+    const std::uint32_t s = senders.at(t, u, v);
+    if (s == Senders::kNone || std::abs(x.x - 0.1F) < 0.002F) continue;
+    EXPECT_EQ(h.points[s].site.position.x > 0.1F, x.x > 0.1F) << x.x;
+  }
+}
+
+TEST(Demand, GivesEveryReaderAPointThatItSees) {
+  const Scene scene = curtain_room(0);
+  Threads threads(2);
+  const Tracer tracer(scene, threads);
+  const GatherFaces faces(scene);
+  const PointPlacement placement{.wanted = 1500};
+  PointHierarchy h = place_points(tracer, faces, placement, threads);
+  std::vector<Readings::Place> readers;
+  for (const TransferPoint& p : vertex_points(scene.mesh)) readers.push_back({p});
+  Senders senders(tracer, h, placement, threads);
+  const auto unseen = [&] {
+    return std::count_if(readers.begin(), readers.end(), [&](const Readings::Place& p) {
+      return senders.nearest(reader_site(p, h.radius.back())) == Senders::kNone;
+    });
+  };
+  const auto before = unseen();
+  const std::size_t placed = h.points.size();
+  add_demanded({tracer, faces, placement, readers}, h, senders, threads);
+  std::printf("unseen before %td after %td of %zu, points %zu and %zu\n", before, unseen(), readers.size(), placed,
+              h.points.size() - placed);
+  EXPECT_GT(before, 100);
+  EXPECT_EQ(unseen(), 0);
+  EXPECT_TRUE(h.demanded);
+  EXPECT_EQ(h.level_end.back(), h.points.size());
+}
+
+TEST(AndersonMixing, SolvesWhatPlainSweepsTakeThousandsFor) {
+  // x = c + T x of pairs that send each other `rho`, as two sheets do: x = (c + rho d) / (1 - rho^2).
+  const std::vector<float> rho = {0.3F, 0.9F, 0.99F, 0.999F, 0.5F};
+  std::vector<Vec3f> x(2 * rho.size());
+  AndersonMixing mixing;
+  const auto apply = [&](const std::vector<Vec3f>& from) {
+    std::vector<Vec3f> out(from.size());
+    for (std::size_t i = 0; i < rho.size(); ++i) {
+      out[2 * i] = Vec3f{1, 2, 3} + from[2 * i + 1] * rho[i];
+      out[2 * i + 1] = from[2 * i] * rho[i];
+    }
+    return out;
+  };
+  for (int sweep = 0; sweep < 60; ++sweep) x = mixing.next(x, apply(x));
+  for (std::size_t i = 0; i < rho.size(); ++i) {
+    const double truth = 1 / (1 - double{rho[i]} * rho[i]);
+    // Rounding of a float (6e-8) over what is left of 1 - .999.
+    EXPECT_NEAR(x[2 * i].x / truth, 1, 6e-5) << rho[i];
+    EXPECT_NEAR(x[2 * i + 1].y / (2 * truth * rho[i]), 1, 6e-5) << rho[i];
+  }
+}
+
 TEST(Senders, AnswerWithTheNearestPointToWithinACell) {
   Scene scene = testing::room_scene();
   Threads threads(2);
   const Tracer tracer(scene, threads);
   const GatherFaces faces(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 3000}, threads);
-  const Senders senders(scene, h, PointPlacement{}, threads);
+  const Senders senders(tracer, h, PointPlacement{}, threads);
   int answered = 0;
   for (std::uint32_t i = 0; i < 3000; ++i) {
     Random random(21, i);

@@ -1,0 +1,61 @@
+#pragma once
+// What a place reads of points: the Shepard weights (one level of basis.h) of those around it that it sees
+// (in_sight.h), so that nothing is read through a wall. Repeat  a pure function of its arguments
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/threads.h"
+#include "core/meshless/basis.h"
+#include "core/prt/transfer_point.h"
+#include "core/trace/tracer.h"
+
+namespace kiln {
+
+class Reading {
+ public:
+  static constexpr float kFewest = 0.05F;  // of the weight of all points: what is less is no interpolation
+
+  /// Keeps a reference to the tracer. `neighbours` around each point set how far it is read.
+  Reading(const Tracer&, std::span<const SurfaceSite>, int neighbours, Threads&);
+
+  /// Points that a place sees, by their index, and the sum of their weights; nothing where that is below kFewest.
+  struct Seen {
+    std::vector<BasisTerm> terms;
+    float sum = 0;
+  };
+  Seen at(const TransferPoint&, std::uint32_t group) const;
+
+ private:
+  const Tracer& tracer_;
+  std::vector<SurfaceSite> sites_;
+  MeshlessBasis basis_;
+};
+
+/// What many places read, as rows of a sparse matrix whose weights add up to 1.
+class Readings {
+ public:
+  struct Place {
+    TransferPoint point;
+    std::uint32_t group = 0;
+  };
+  Readings(const Reading&, std::span<const Place>, Threads&);
+
+  /// Whether the place sees any point.
+  bool any(std::size_t place) const { return begin_[place + 1] > begin_[place]; }
+  std::span<const BasisTerm> terms(std::size_t place) const {
+    return std::span(terms_).subspan(begin_[place], begin_[place + 1] - begin_[place]);
+  }
+  Vec3f apply(std::size_t place, std::span<const Vec3f> values) const {
+    Vec3f sum;
+    for (const BasisTerm& t : terms(place)) sum += values[t.function] * t.value;
+    return sum;
+  }
+
+ private:
+  std::vector<std::size_t> begin_;
+  std::vector<BasisTerm> terms_;
+};
+
+}  // namespace kiln
