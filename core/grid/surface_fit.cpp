@@ -15,7 +15,7 @@ constexpr std::size_t kFunctions = 9;
 using Functions = std::array<float, kFunctions>;
 using Coefficients = std::array<Vec3f, kFunctions>;
 using Unknowns = std::vector<Coefficients>;  // of each vertex
-using Readings = std::vector<Vec3f>;         // of each place
+using PlaceReadings = std::vector<Vec3f>;    // of each place
 
 const auto kLinear = static_cast<float>(kBand1 * std::sqrt(3.0));
 const auto kMixed = static_cast<float>(kBand2 * std::sqrt(15.0));
@@ -70,7 +70,7 @@ class Equations {
   std::size_t vertices() const { return first_.size() - 1; }
 
   /// out = A y
-  void read(const Unknowns& y, Readings& out) const {
+  void read(const Unknowns& y, PlaceReadings& out) const {
     threads_.for_blocks(rows_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Row& row = rows_[i];
@@ -84,7 +84,7 @@ class Equations {
     });
   }
   /// out = A^T r - kTrust y
-  void gradient(const Readings& r, const Unknowns& y, Unknowns& out) const {
+  void gradient(const PlaceReadings& r, const Unknowns& y, Unknowns& out) const {
     threads_.for_blocks(vertices(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin; v < end; ++v) {
         for (std::size_t j = 0; j < kFunctions; ++j) out[v][j] = y[v][j] * -kTrust;
@@ -156,10 +156,10 @@ void each(std::size_t count, Threads& threads, const F& f) {
 }
 
 /// y of equation 1. `left` is r, and becomes what is left of it.
-Unknowns solve(const Equations& equations, Readings left, Threads& threads) {
+Unknowns solve(const Equations& equations, PlaceReadings left, Threads& threads) {
   const std::size_t n = equations.vertices();
   Unknowns y(n), slope(n), way;
-  Readings along(left.size());
+  PlaceReadings along(left.size());
   equations.gradient(left, y, slope);
   way = slope;
   Vec3d steep = squares(slope, threads);
@@ -185,7 +185,7 @@ Unknowns solve(const Equations& equations, Readings left, Threads& threads) {
 
 void fit_to_surface(const std::vector<SurfacePlace>& places, Grid& grid, Threads& threads) {
   EXPECTS(grid.blend == GridBlend::exact);
-  Readings missing(places.size());
+  PlaceReadings missing(places.size());
   each(places.size(), threads, [&](std::size_t i) {
     missing[i] = places[i].light - irradiance_at(grid, to_double(places[i].position), places[i].normal);
   });

@@ -7,6 +7,7 @@
 #include "core/grid/cell_corners.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/points.h"
+#include "core/prt/ray_origin.h"
 #include "core/trace/surface.h"
 #include "core/trace/surface_samples.h"
 
