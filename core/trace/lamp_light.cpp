@@ -15,10 +15,20 @@ Vec3d times(const Vec3d& a, const Vec3f& b) { return a * to_double(b); }
 /// The side of its face that a vertex's rays leave from.
 Vec3d side_of(const PathVertex& v) { return dot(v.normal, v.face) < 0 ? -v.face : v.face; }
 
-/// Per area at a place, of cosine-distributed rays from a vertex that sees it.
+/// Per area at a place, of cosine-distributed rays from a vertex that sees it; 0 where the two are one.
 double density_at(const PathVertex& from, const Vec3d& place, const Vec3d& face) {
-  const Vec3d way = place - from.position, w = normalized(way);
-  return std::max(0.0, dot(w, from.normal)) * std::abs(dot(w, face)) / (std::numbers::pi * dot(way, way));
+  const Vec3d way = place - from.position;
+  const double distance2 = dot(way, way);
+  if (!(distance2 > 0)) return 0;
+  const Vec3d w = normalized(way);
+  return std::max(0.0, dot(w, from.normal)) * std::abs(dot(w, face)) / (std::numbers::pi * distance2);
+}
+
+/// Beams that leave an emitter and end at a vertex, against one ray of the path there: per solid angle around w at the
+/// vertex, as `density` of the emitter's point is per area.
+double beams_against_path(double share, double density, bool both_sides, const Vec3d& w, const PathVertex& v) {
+  const double beams = share * density * std::abs(dot(w, v.face)) / (std::numbers::pi * (both_sides ? 2 : 1));
+  return beams > 0 ? beams / v.against_beams : 0;
 }
 
 /// The point of a surface as it is seen from a place; nothing from behind a single-sided face, or along it.
@@ -41,7 +51,7 @@ double power(const Light& light) {
 PathVertex vertex_after(const PathVertex& from, const Vec3d& position, const Vec3d& normal, const Vec3d& face) {
   PathVertex out{position, normal, face, density_at(from, position, face)};
   const double back = density_at(out, from.position, from.face);
-  out.against_beams = out.density / (1 + (std::isfinite(from.density) ? back / from.density : 0));
+  out.against_beams = back > 0 ? out.density / (1 + back / from.density) : out.density;
   return out;
 }
 
@@ -95,9 +105,8 @@ Vec3d LampLight::sent(const Sender& from, const PathVertex& v) {
   const LightArrival arrival = light_arrival(*from.light, v.position);
   const double cosine = dot(arrival.direction, v.normal);
   if (cosine <= 0 || arrival.irradiance == Vec3d{}) return {};
-  const double balance = std::isfinite(v.density) && from.share > 0
-                             ? v.against_beams / (v.against_beams + density_of_beams(from, arrival, v))
-                             : 1;
+  const double beams = std::isfinite(v.density) && from.share > 0 ? density_of_beams(from, arrival, v) : 0;
+  const double balance = beams > 0 ? v.against_beams / (v.against_beams + beams) : 1;
   return arrival.irradiance * (cosine / std::numbers::pi * balance);
 }
 
@@ -109,8 +118,7 @@ Vec3d LampLight::emitted(const EmitterSample& from, const PathVertex& v) const {
   const double facing = -dot(w, from.normal), own = dot(w, v.normal) / std::numbers::pi;
   if (distance2 == 0 || own <= 0 || (from.double_sided ? facing == 0 : facing <= 0)) return {};
   const double shadow_ray = from.density * distance2 / std::abs(facing);  // per solid angle, as all three
-  const double beam = senders_.back().share * from.density * std::abs(dot(w, v.face)) /
-                      (std::numbers::pi * (from.double_sided ? 2 : 1) * v.against_beams);
+  const double beam = beams_against_path(senders_.back().share, from.density, from.double_sided, w, v);
   return from.radiance * (own / (own + shadow_ray + beam));
 }
 
@@ -151,8 +159,7 @@ void LampLight::add_met(const PathVertex& v, const Vec3d& w, double density, con
       scene_.materials[static_cast<std::size_t>(scene_.parts[scene_.mesh.part[hit.triangle]].material)].double_sided;
   const double facing = std::max(1e-12, std::abs(dot(w, to_double(p.geometric_normal))));
   const double shadow_ray = strength * double{hit.t} * double{hit.t} / facing;
-  const double beam = senders_.back().share * strength * std::abs(dot(w, v.face)) /
-                      (std::numbers::pi * (both ? 2 : 1) * v.against_beams);
+  const double beam = beams_against_path(senders_.back().share, strength, both, w, v);
   sum[own_.size()] += times(weight, emission_at(scene_, p)) * (density / (density + shadow_ray + beam));
 }
 
