@@ -32,7 +32,7 @@ void BrightSpots::find_lamps(double mean_light) {
   for (const Light& light : tracer_.scene().lights) {
     if (light.type == LightType::directional || !(mean_of(light.intensity) > 0)) continue;
     const double reach2 = mean_of(light.intensity) / (std::numbers::pi * kBright * std::max(mean_light, 1e-30));
-    lamps_.push_back({&light, static_cast<float>(std::min(std::sqrt(reach2), double{kFar}))});
+    if (reach2 > 0) lamps_.push_back({&light, static_cast<float>(std::min(std::sqrt(reach2), double{kFar}))});
   }
 }
 
