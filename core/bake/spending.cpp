@@ -22,6 +22,8 @@ Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint6
   Spending out;
   out.samples = static_cast<int>(std::clamp(wanted, kFewestSamples, paths / fewest));
   out.points = static_cast<std::size_t>(std::clamp(paths / out.samples, fewest, double{Spending::kMostPoints}));
+  // What no point takes goes into paths: a pilot knows the error to a factor only.
+  out.samples = std::max(out.samples, static_cast<int>(paths / static_cast<double>(out.points)));
   return out;
 }
 
