@@ -215,11 +215,16 @@ TEST_F(Light, AGridIsAskedAsAnArtefactIsAndAgreesWithTheReflectedLightOfTheRefer
   const ValueTable stored = values({"eval", grid, "--points", points});
   const ValueTable truth = values({"reference", room, "--points", points, "--indirect", "--samples", "256"});
   ASSERT_EQ(stored.values.size(), 300U);
-  double apart = 0, mean = 0;
+  double apart = 0, mean = 0, seen = 0;
   for (std::size_t i = 0; i < 300; ++i) {
-    apart += std::pow(stored.values[i].irradiance.y - truth.values[i].irradiance.y, 2) / 300;
-    mean += truth.values[i].irradiance.y / 300;
+    const double light = truth.values[i].irradiance.y;
+    if (light == 0) continue;  // floor inside a box, which the certificate does not judge
+    apart += std::pow(stored.values[i].irradiance.y - light, 2);
+    mean += light;
+    ++seen;
   }
+  ASSERT_GT(seen, 250);
+  apart /= seen, mean /= seen;
   const json report = json::parse(folder.read("out/report.json"));
   const double certified = report["grid"]["certificate"]["interval"][1];
   EXPECT_LT(std::sqrt(apart) / mean, 1.5 * certified + 0.05);  // other points, one channel, and the reference's noise

@@ -35,16 +35,16 @@ TEST(GridBake, OfARoomDeliversAGridThatHoldsItsCertificate) {
   EXPECT_FALSE(grid->cells.empty());
   const json report = report_of(*output)["grid"];
   const json& certificate = report["certificate"];
-  std::printf("%s\n", certificate.dump().c_str());
   EXPECT_EQ(report["bytes"], file(*output, "grid.exr").size());
-  // The Cornell box, a room of the same kind, has .08 at 16 vertices (core/grid/README.md).
-  EXPECT_LT(certificate["relrmse"].get<double>(), 0.15);
+  // The Cornell box, a room of the same kind, has .03 at 16 vertices (core/grid/README.md); .016 was measured here.
+  EXPECT_LT(certificate["relrmse"].get<double>(), 0.05);
   EXPECT_GT(certificate["interval"][1].get<double>(), 0.0);
   EXPECT_GT(certificate["points"].get<int>(), 500);
   const json& sources = certificate["sources"];
-  // Half floats add less than a thousandth (issue 5); rays less than what is left.
+  // Half floats add less than a thousandth (issue 5); of the rays' noise .016 was measured, and the fit leaves hardly
+  // more.
   EXPECT_LT(sources["storage"].get<double>(), 0.001);
-  EXPECT_LT(sources["noise"].get<double>(), sources["lattice"].get<double>());
+  EXPECT_LT(sources["noise"].get<double>(), 0.03);
   EXPECT_FALSE(report_of(*output)["certificate"].is_null());  // of scene.glb
 }
 
