@@ -9,6 +9,7 @@ import {
   LineBasicMaterial,
   LineSegments,
   DataUtils,
+  FrontSide,
   type Material,
   Mesh,
   ShaderMaterial,
@@ -55,11 +56,14 @@ export class GridView {
     this.viewer.stage.requestDraw();
   }
 
-  /// The model's meshes with the grid's material in place of their own.
+  /// The model's meshes with the grid's material in place of their own, seen from the sides they are seen from.
   private lightSurfaces(): Shown {
-    const material = gridMaterial(this.textures, true);
+    const front = gridMaterial(this.textures, true);
+    const both = gridMaterial(this.textures, true);
+    front.side = FrontSide;
     const undo = this.viewer.model.parts.map(({ mesh }) => {
       const own = mesh.material;
+      const material = [own].flat().every((m) => m.side === FrontSide) ? front : both;
       mesh.material = material;
       return () => {
         if (mesh.material === material) mesh.material = own;
@@ -68,7 +72,8 @@ export class GridView {
     return {
       dispose: () => {
         for (const step of undo) step();
-        material.dispose();
+        front.dispose();
+        both.dispose();
       },
     };
   }
