@@ -34,6 +34,11 @@ std::vector<int> rounds_of(int packets, int first) {
   return out;
 }
 
+Vec3f spread_over(Spread spread, const Vec2f& u) {
+  if (spread == Spread::cosine) return cosine_hemisphere(u);
+  return to_float(uniform_sphere(Vec2<double>{spread == Spread::half_sphere ? 0.5 * u.x : u.x, u.y}));
+}
+
 }  // namespace
 
 DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t seed, int first, Spread spread)
@@ -46,8 +51,7 @@ DirectionSets::DirectionSets(int order, int samples, int sets, std::uint64_t see
   x_.reserve(total), y_.reserve(total), z_.reserve(total);
   for (int set = 0; set < sets; ++set) {
     for (const Vec2f& u : square_points(rounds_, mix64(seed ^ static_cast<std::uint64_t>(set)))) {
-      const Vec3f w =
-          spread == Spread::cosine ? cosine_hemisphere(u) : to_float(uniform_sphere(Vec2<double>{u.x, u.y}));
+      const Vec3f w = spread_over(spread, u);
       if (order > 0) evaluate_sh(order, w, rows_.data() + x_.size() * static_cast<std::size_t>(row_width_));
       x_.push_back(w.x), y_.push_back(w.y), z_.push_back(w.z);
     }

@@ -1,6 +1,6 @@
 #pragma once
 // Directions with their SH values, made once and shared by all points: cosine-distributed about +z, or uniform on the
-// sphere.
+// half space of +z or the sphere.
 //
 // Each set is a two-dimensional Owen-scrambled Sobol point set, mapped to the hemisphere without distortion. It comes
 // in rounds: the rays up to the end of each are a stratified set of their own, the last all of them. Within a round
@@ -17,7 +17,7 @@
 
 namespace kiln {
 
-enum class Spread { cosine, sphere };
+enum class Spread { cosine, half_sphere, sphere };
 
 class DirectionSets {
  public:

@@ -1,0 +1,162 @@
+#include "core/lightfield/outgoing.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/expects.h"
+#include "core/lightfield/lobe_fits.h"
+#include "core/prt/direction_sets.h"
+#include "core/prt/ray_origin.h"
+#include "core/prt/transfer_point.h"
+#include "core/trace/ggx.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+constexpr int kSets = 8, kBatch = 4;
+constexpr std::size_t kBlock = 64;
+constexpr double kEven = 0.5 / std::numbers::pi;  // density of a vertex' rays
+
+/// What a vertex is made of.
+struct VertexMaterial {
+  Vec3f f0, below, emission;
+  double roughness = 1;
+};
+
+VertexMaterial material_at(const Scene& scene, std::uint32_t vertex, std::uint32_t face) {
+  if (face == kNoFace) return {};
+  const Triangle& t = scene.mesh.triangles[face];
+  const SurfacePoint p = surface_point(scene, face, t[1] == vertex ? 1.0F : 0.0F, t[2] == vertex ? 1.0F : 0.0F);
+  const SurfaceFinish finish = finish_at(scene, p);
+  const Vec3d color = to_double(albedo_at(scene, p));
+  return {to_float(specular_f0(color, finish.metallic)), to_float(diffuse_color(color, finish.metallic)),
+          emission_at(scene, p), finish.roughness};
+}
+
+/// The two halves of a vertex' rays: their mean is the result, their difference the noise.
+struct Halves {
+  std::array<LobeSum, 2> sums;
+};
+
+class Gather {
+ public:
+  Gather(const IncidentLight::World& world, const OutgoingBake& params)
+      : seed_(mix64(params.seed ^ 0x6f7574676f696eULL)),
+        sets_(0, 2 * half_of(params.rays), kSets, seed_, half_of(params.rays), Spread::half_sphere),
+        light_(world, {.count = sets_.samples(), .density = kEven, .direct = true}, seed_) {}
+
+  void add(const TransferPoint& point, Halves& into, std::uint64_t& rays) const {
+    const Vec3f origin = ray_origin(point);
+    const std::uint64_t item = point_key(point);
+    const LocalFrame frame = local_frame(sets_, point.normal, seed_, item);
+    const Basis<float> local = basis_around(point.normal);
+    Random random(seed_, item, 2);
+    const int batches = sets_.samples() / (kBatch * kPacket);
+    const float weight = static_cast<float>(1 / (kEven * sets_.samples()));
+    for (int k = 0; k < batches; ++k) {
+      trace(origin, frame, k, [&](const Vec3f& w, const Hit& hit) {
+        const Vec3f light = light_.along(w, hit, random, rays).light;
+        if (light != Vec3f{}) into.sums[k < batches / 2 ? 0 : 1].add(local.to_local(w), light * weight);
+      });
+    }
+    rays += static_cast<std::uint64_t>(sets_.samples());
+    light_.visit_lights(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place) {
+      const Vec3f l = local.to_local(w);
+      if (place < 0)
+        for (LobeSum& half : into.sums) half.add(l, light * 0.5F);
+      else
+        into.sums[place < 0.5F ? 0 : 1].add(l, light);
+    });
+  }
+
+ private:
+  /// Each half of the rays is a stratified set of whole batches.
+  static int half_of(int rays) { return (rays + 2 * kBatch * kPacket - 1) / (2 * kBatch * kPacket) * kBatch * kPacket; }
+
+  template <class Look>
+  void trace(const Vec3f& origin, const LocalFrame& frame, int batch, const Look& look) const {
+    const IncidentLight::World& world = light_.world();
+    std::array<Rays16, kBatch> rays;
+    std::array<Hits16, kBatch> hits;
+    for (std::size_t k = 0; k < kBatch; ++k) {
+      rays[k].ox.fill(origin.x), rays[k].oy.fill(origin.y), rays[k].oz.fill(origin.z), rays[k].far.fill(kFar);
+      sets_.turn(frame.set, batch * kBatch + static_cast<int>(k), frame.basis, rays[k]);
+      world.tracer.closest16(rays[k], hits[k]);
+      for (const std::uint32_t triangle : hits[k].triangle) {
+        if (triangle != kNoHit && world.surface != nullptr) world.surface->prefetch(triangle);
+      }
+    }
+    for (std::size_t k = 0; k < kBatch; ++k) {
+      for (std::size_t i = 0; i < kPacket; ++i)
+        look(Vec3f{rays[k].dx[i], rays[k].dy[i], rays[k].dz[i]},
+             Hit{hits[k].t[i], hits[k].u[i], hits[k].v[i], hits[k].triangle[i], false});
+    }
+  }
+
+  std::uint64_t seed_;
+  DirectionSets sets_;
+  IncidentLight light_;
+};
+
+}  // namespace
+
+OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const Vec3f> value, const OutgoingBake& params,
+                            Threads& threads) {
+  const Scene& scene = world.tracer.scene();
+  EXPECTS(value.size() == scene.mesh.position.size());
+  EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
+  const LobeFits fits(params.degree, threads);
+  const Gather gather(world, params);
+  const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
+  const std::vector<TransferPoint> points = vertex_points(scene.mesh);
+  const std::vector<std::uint32_t> order = morton_order_of(points);
+  OutgoingLight out{.field = {params.degree, {}}};
+  const std::size_t numbers = 3 * out.field.count();
+  out.field.coefficients.resize(numbers * points.size());
+  std::vector<double> noise(points.size()), mean(points.size());
+  std::atomic<std::uint64_t> rays = 0, done = 0;
+  threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::uint64_t own = 0;
+    std::vector<float> half(numbers);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t v = order[i];
+      const VertexMaterial material = material_at(scene, v, faces[v]);
+      const LobeFit fit = fits.at(material.roughness);
+      Halves halves{{LobeSum(fit), LobeSum(fit)}};
+      gather.add(points[v], halves, own);
+      // The mean of both halves, each of which stands for half of the light.
+      const Vec3f below = material.below * value[v];
+      const std::span<float> all = out.field.of(v);
+      halves.sums[0].finish(material.f0, below, 2, all);
+      halves.sums[1].finish(material.f0, below, 2, half);
+      const Basis<float> basis = basis_around(points[v].normal);
+      constexpr double kWhite = 3.5449077018110318;  // 2 sqrt(pi): coefficient of a constant 1
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::size_t first = c * out.field.count();
+        for (std::size_t k = first; k < first + out.field.count(); ++k) {
+          const double off = 0.5 * (double{all[k]} - double{half[k]});
+          noise[v] += off * off / (4 * std::numbers::pi * 3);
+          all[k] = 0.5F * (all[k] + half[k]);
+        }
+        rotate_sh(params.degree + 1, basis, &all[first], &all[first]);
+        all[first] += material.emission[c] * static_cast<float>(kWhite);
+        mean[v] += double{all[first]} / (kWhite * 3);
+      }
+    }
+    rays += own;
+    done += end - begin;
+    if (params.progress) params.progress(done, points.size());
+  });
+  out.rays = rays;
+  double squares = 0, sum = 0;
+  for (std::size_t v = 0; v < points.size(); ++v) squares += noise[v], sum += mean[v];
+  const auto n = static_cast<double>(std::max<std::size_t>(1, points.size()));
+  out.noise = sum > 0 ? std::sqrt(squares / n) / (sum / n) : 0;
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,96 @@
+#include "core/meshless/incident_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/prt/ray_origin.h"
+#include "core/sphere/sampling.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+
+IncidentLight::IncidentLight(const World& world, const Rays& own, std::uint64_t seed)
+    : world_(world), own_(own), seed_(seed), emitters_(world.tracer.scene()) {
+  if (!own.direct || world.sky == nullptr) return;
+  EnvironmentSampler sampler(*world.sky);
+  if (sampler.useful()) bright_ = std::move(sampler);
+}
+
+IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
+  if (!hit) return {own_.direct ? seen_sky(w) : Vec3f{}, Met::sky};
+  if (world_.faces.side(hit.triangle, w) == HitSide::dark) return {{}, Met::back};
+  LitSurface::Reflected from{.light = {}, .known = true};
+  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, random, rays);
+  return {own_.direct ? from.light + seen_emitter(hit, w) : from.light, from.known ? Met::lit : Met::unknown};
+}
+
+void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
+                                 const Visit& visit) const {
+  if (!own_.direct) return;
+  visit_punctual(place, rays, visit);
+  visit_bright_sky(place, item, rays, visit);
+  visit_emitters(place, item, rays, visit);
+}
+
+Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
+  if (world_.sky == nullptr) return {};
+  const double balance = bright_ ? own_.density / (own_.density + bright_->density(to_double(w))) : 1;
+  return environment_radiance(*world_.sky, w) * static_cast<float>(balance);
+}
+
+Vec3f IncidentLight::seen_emitter(const Hit& hit, const Vec3f& w) const {
+  const double per_area = emitters_.density(hit.triangle);
+  if (!(per_area > 0)) return {};
+  const SurfacePoint p = surface_point(world_.tracer.scene(), hit.triangle, hit.u, hit.v);
+  const double facing = std::max(1e-12, std::abs(double{dot(w, p.geometric_normal)}));
+  const double other = per_area * double{hit.t} * double{hit.t} / facing;
+  return emission_at(world_.tracer.scene(), p) * static_cast<float>(own_.density / (own_.density + other));
+}
+
+void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit& visit) const {
+  for (const Light& light : world_.tracer.scene().lights) {
+    const LightArrival arrival = light_arrival(light, to_double(place));
+    if (arrival.irradiance == Vec3d{}) continue;
+    ++rays;
+    const Vec3f w = to_float(arrival.direction);
+    const float far = std::isfinite(arrival.distance) ? static_cast<float>(arrival.distance) : kFar;
+    if (!world_.tracer.occluded(place, w, far)) visit(w, to_float(arrival.irradiance), -1);
+  }
+}
+
+void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
+                                     const Visit& visit) const {
+  if (!bright_) return;
+  for (int k = 0; k < own_.count; ++k) {
+    const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x736b79ULL)));
+    const Vec3d w = bright_->sample({u.x, u.y});
+    if (world_.tracer.occluded(place, to_float(w), kFar)) continue;
+    const double share = 1 / (own_.count * (own_.density + bright_->density(w)));
+    visit(to_float(w), environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share), place_of(k));
+  }
+  rays += static_cast<std::uint64_t>(own_.count);
+}
+
+void IncidentLight::visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
+                                   const Visit& visit) const {
+  if (emitters_.empty()) return;
+  Random random(seed_, item, 3);
+  for (int k = 0; k < own_.count; ++k) {
+    const double pick = (k + random.uniform_double()) / own_.count;
+    const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x6c616d70ULL)));
+    const EmitterSample to = emitters_.sample(pick, {u.x, u.y});
+    const Vec3d way = to.position - to_double(place);
+    const double distance2 = dot(way, way);
+    const Vec3d w = normalized(way);
+    const double facing = -dot(w, to.normal);
+    if (!(distance2 > 0) || (to.double_sided ? facing == 0 : facing <= 0)) continue;
+    const Vec3f end = offset_origin(to_float(to.position), to_float(facing < 0 ? -to.normal : to.normal)) - place;
+    const float far = length(end);
+    if (world_.tracer.occluded(place, normalized(end), far)) continue;
+    const double density = to.density * distance2 / std::abs(facing);
+    visit(to_float(w), to_float(to.radiance / (own_.count * (density + own_.density))), place_of(k));
+  }
+  rays += static_cast<std::uint64_t>(own_.count);
+}
+
+}  // namespace kiln

@@ -1,0 +1,71 @@
+#pragma once
+// Light that arrives at a place, direction by direction, for whoever sums it up.
+//   integral of L(w) g(w) dw = sum over rays of along(w) g(w) / (count density) + sum over visited of light g(w) (1)
+// The caller's rays have one density over all directions that matter to it; what they would find badly (punctual lights
+// exactly, the sky's bright parts, emitters) is visited beside them, joined by the balance heuristic (Veach and
+// Guibas 1995). Surfaces reflect as in lit_surface.h.
+// Units   W m^-2 sr^-1 along a ray; visited light is W m^-2, of a plane that faces it.
+// Repeat  a pure function of its arguments
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "core/base/random.h"
+#include "core/meshless/lit_surface.h"
+#include "core/scene/environment.h"
+#include "core/trace/environment_sampler.h"
+#include "core/trace/lights.h"
+
+namespace kiln {
+
+class IncidentLight {
+ public:
+  /// What rays meet. `surface` may be null: it reflects nothing. `sky` may be null: darkness beyond the scene.
+  struct World {
+    const Tracer& tracer;
+    const GatherFaces& faces;
+    const LitSurface* surface = nullptr;
+    const Environment* sky = nullptr;
+  };
+  struct Rays {
+    int count = 0;
+    double density = 0;  // per solid angle
+    bool direct = true;  // emitters, sky and punctual lights too; else only what surfaces reflect
+  };
+  /// References of the world must outlive it.
+  IncidentLight(const World&, const Rays&, std::uint64_t seed);
+
+  const World& world() const { return world_; }
+
+  enum class Met { sky, lit, unknown, back };  // unknown: a surface that no light is known of
+  struct Seen {
+    Vec3f light;
+    Met met = Met::sky;
+  };
+  /// What one of the caller's rays brings. Adds the rays of paths to `rays`.
+  Seen along(const Vec3f& w, const Hit&, Random&, std::uint64_t& rays) const;
+
+  /// `place`: how far in its set the sample is, from 0 to 1, of which each half is a set as well; -1 of exact light.
+  using Visit = std::function<void(const Vec3f& w, const Vec3f& light, float place)>;
+  /// Visits the lamps' and the bright sky's light at a place, `item` of which names its random numbers. Nothing
+  /// without `direct`. Adds to `rays`.
+  void visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+
+ private:
+  Vec3f seen_sky(const Vec3f& w) const;
+  Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
+  void visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit&) const;
+  void visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+  void visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+
+  float place_of(int sample) const { return static_cast<float>(sample) / static_cast<float>(own_.count); }
+
+  World world_;
+  Rays own_;
+  std::uint64_t seed_;
+  EmitterSampler emitters_;
+  std::optional<EnvironmentSampler> bright_;  // of a map that has brighter and darker parts
+};
+
+}  // namespace kiln

@@ -1,0 +1,122 @@
+// Light fields of small scenes against the path-traced reference.
+#include "core/lightfield/outgoing.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/lightfield/seen.h"
+#include "core/meshless/radiosity.h"
+#include "core/prt/lobe_table.h"
+#include "core/trace/ggx.h"
+#include "core/trace/reference.h"
+#include "core/trace/surface_samples.h"
+#include "tests/core/prt/test_scenes.h"
+
+namespace kiln {
+namespace {
+
+/// A metal ball beside a diffuse wall.
+Scene ball_and_wall() {
+  Scene scene = testing::empty_scene();
+  const std::uint32_t metal = testing::add_part(scene, {0.9F, 0.6F, 0.3F});
+  testing::add_sphere(scene, {0, 0, 0}, 0.2F, 24, metal);
+  const std::uint32_t wall = testing::add_part(scene, {0.8F, 0.2F, 0.2F});
+  testing::add_grid(scene, {-0.4F, -0.4F, 0.4F}, {0, 0.8F, 0}, {0.8F, 0, 0}, 8, 8, wall);
+  for (Material& m : scene.materials) m.metallic = 0, m.roughness = 1;
+  Material& m = scene.materials[static_cast<std::size_t>(scene.parts[metal].material)];
+  m.metallic = 1, m.roughness = 0.5F;
+  return scene;
+}
+
+struct Made {
+  OutgoingLight light;
+  std::vector<Vec3f> value;
+};
+
+Made make(const Tracer& tracer, const Environment& sky, OutgoingBake params, Threads& threads) {
+  const RadiosityResult r = solve_radiosity(tracer, &sky, {}, threads);
+  Made out;
+  for (std::size_t v = 0; v < r.direct.size(); ++v) out.value.push_back(r.direct[v] + r.indirect[v]);
+  const GatherFaces faces(tracer.scene());
+  out.light = bake_outgoing({tracer, faces, r.surface.get(), &sky}, out.value, params, threads);
+  return out;
+}
+
+TEST(Outgoing, AMetalBallBesideAWallLooksAsPathsSeeIt) {
+  Threads threads(2);
+  const Scene scene = ball_and_wall();
+  const Tracer tracer(scene, threads);
+  const Environment sky = overcast_sky();
+  const Made made = make(tracer, sky, {.degree = 8, .rays = 2048}, threads);
+  const Mesh& mesh = scene.mesh;
+  // Vertices of the ball, seen from random directions.
+  std::vector<EyedPoint> eyes;
+  std::vector<std::uint32_t> vertices;
+  for (std::uint32_t v = 30; v < 500; v += 7) {
+    Random random(1, v);
+    const Vec3d n = to_double(mesh.normal[v]);
+    vertices.push_back(v);
+    eyes.push_back({{mesh.position[v], mesh.normal[v], mesh.normal[v]},
+                    to_float(random_view(n, random)),
+                    ggx_alpha(0.5),
+                    {0.9, 0.6, 0.3}});
+  }
+  const ReferenceResult truth =
+      trace_specular(tracer, eyes, {.environments = {sky}}, {.samples = 2048, .seed = 5}, threads);
+  double squares = 0, mean = 0, noise = 0;
+  for (std::size_t i = 0; i < eyes.size(); ++i) {
+    const std::uint32_t v = vertices[i];
+    const Vec3d shown =
+        seen_radiance(made.light.field, {v, v, v}, 0, 0, to_double(mesh.normal[v]), to_double(eyes[i].view));
+    for (std::size_t c = 0; c < 3; ++c) {
+      squares += std::pow(shown[c] - truth.value[i][c], 2);
+      noise += std::pow((truth.half_a[i][c] - truth.half_b[i][c]) / 2, 2);
+      mean += truth.value[i][c];
+    }
+  }
+  const double n = 3 * static_cast<double>(eyes.size());
+  const double error = std::sqrt(std::max(0.0, squares - noise) / n) / (mean / n);
+  EXPECT_LT(error, 0.02);  // .011 measured: bands 0 to 8 of a lobe of roughness .5, half of it noise of the rays
+  EXPECT_LT(made.light.noise, 0.01);
+  EXPECT_GT(made.light.noise, 0.001);
+}
+
+TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
+  const Scene scene = ball_and_wall();
+  const Environment sky = overcast_sky();
+  std::vector<float> first;
+  for (const int count : {1, 3}) {
+    Threads threads(count);
+    const Tracer tracer(scene, threads);
+    const std::vector<Vec3f> value(scene.mesh.position.size(), {0.5F, 0.5F, 0.5F});
+    const GatherFaces faces(scene);
+    const OutgoingLight made =
+        bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128}, threads);
+    if (first.empty()) first = made.field.coefficients;
+    EXPECT_EQ(first, made.field.coefficients);
+  }
+}
+
+TEST(Outgoing, WhatGlowsInTheDarkLooksTheSameFromEverywhere) {
+  Threads threads(2);
+  Scene scene = testing::empty_scene();
+  const std::uint32_t part = testing::add_part(scene, {0, 0, 0});
+  testing::add_grid(scene, {-0.5F, 0, -0.5F}, {0, 0, 1}, {1, 0, 0}, 2, 2, part);
+  scene.materials[static_cast<std::size_t>(scene.parts[part].material)].emission = {1, 2, 3};
+  const Tracer tracer(scene, threads);
+  const std::vector<Vec3f> value(scene.mesh.position.size());
+  const GatherFaces faces(scene);
+  const OutgoingLight made =
+      bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 4, .rays = 128}, threads);
+  const Triangle& t = scene.mesh.triangles[0];
+  for (const Vec3d& v : {Vec3d{0, 1, 0}, normalized(Vec3d{1, 0.1, 0})}) {
+    const Vec3d seen = seen_radiance(made.field, t, 0.3, 0.3, to_double(scene.mesh.normal[t[0]]), v);
+    EXPECT_NEAR(seen.x, 1, 1e-5);
+    EXPECT_NEAR(seen.y, 2, 1e-5);
+    EXPECT_NEAR(seen.z, 3, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace kiln
