@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -14,6 +15,32 @@ IncidentLight::IncidentLight(const World& world, const Rays& own, std::uint64_t 
   if (!own.direct || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
   if (sampler.useful()) bright_ = std::move(sampler);
+  if (own.blurred && bright_) blurred_ = blurred_sky();
+}
+
+/// The sky as rays see it, at a resolution of one texel for each.
+Environment IncidentLight::blurred_sky() const {
+  constexpr int kFinest = 512;
+  Environment out{.name = {}, .width = 0, .height = 0, .radiance = {}};
+  const double texels = 4 * std::numbers::pi * own_.density * own_.count;
+  out.height = std::clamp(static_cast<int>(std::lround(std::sqrt(texels / 2))), 4, kFinest);
+  out.width = 2 * out.height;
+  const int parts = std::max(2, kFinest / out.height);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      Vec3d sum;
+      double all = 0;
+      for (int i = 0; i < parts * parts; ++i) {
+        const double v = (y + (i / parts + 0.5) / parts) / out.height, u = (x + (i % parts + 0.5) / parts) / out.width;
+        const double up = std::numbers::pi * (0.5 - v), around = 2 * std::numbers::pi * (u - 0.5);
+        const Vec3d w{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)};
+        sum += to_double(balanced_sky(to_float(w))) * std::cos(up);
+        all += std::cos(up);
+      }
+      out.radiance.push_back(to_float(sum / all));
+    }
+  }
+  return out;
 }
 
 IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
@@ -32,10 +59,14 @@ void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::ui
   visit_emitters(place, item, rays, visit);
 }
 
-Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
-  if (world_.sky == nullptr) return {};
+Vec3f IncidentLight::balanced_sky(const Vec3f& w) const {
   const double balance = bright_ ? own_.density / (own_.density + bright_->density(to_double(w))) : 1;
   return environment_radiance(*world_.sky, w) * static_cast<float>(balance);
+}
+
+Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
+  if (world_.sky == nullptr) return {};
+  return blurred_ ? environment_radiance(*blurred_, w) : balanced_sky(w);
 }
 
 Vec3f IncidentLight::seen_emitter(const Hit& hit, const Vec3f& w) const {
