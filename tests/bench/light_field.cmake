@@ -1,0 +1,4 @@
+add_executable(kiln_light_field_bench light_field.cpp)
+set_target_properties(kiln_light_field_bench PROPERTIES OUTPUT_NAME kiln_light_field)
+kiln_flags(kiln_light_field_bench)
+target_link_libraries(kiln_light_field_bench PRIVATE kiln_lightfield)
