@@ -103,6 +103,28 @@ void HemisphereNorm::to_coordinates(const Vec3d& n, std::size_t columns, double*
   }
 }
 
+void HemisphereNorm::products(const Vec3d& n, std::size_t functions, std::vector<double>& c,
+                              std::vector<float>& products) const {
+  EXPECTS(c.size() == 3 * functions * count());
+  to_coordinates(n, 3 * functions, c.data());
+  // One function after the other, filled up to whole blocks of four sums that run side by side.
+  const std::size_t row = (3 * count() + 3) / 4 * 4;
+  std::vector<double> f(functions * row);
+  for (std::size_t i = 0; i < count(); ++i)
+    for (std::size_t k = 0; k < functions; ++k)
+      for (std::size_t channel = 0; channel < 3; ++channel)
+        f[k * row + 3 * i + channel] = c[(i * functions + k) * 3 + channel];
+  products.clear();
+  for (std::size_t i = 0; i < functions; ++i) {
+    for (std::size_t k = 0; k <= i; ++k) {
+      std::array<double, 4> sum{};
+      for (std::size_t at = 0; at < row; at += 4)
+        for (std::size_t lane = 0; lane < 4; ++lane) sum[lane] += f[i * row + at + lane] * f[k * row + at + lane];
+      products.push_back(static_cast<float>((sum[0] + sum[1]) + (sum[2] + sum[3])));
+    }
+  }
+}
+
 double squared_norm(const HemisphereNorm& norm, const Vec3d& n, std::span<const double> rgb) {
   EXPECTS(rgb.size() == 3 * norm.count());
   std::vector<double> columns;

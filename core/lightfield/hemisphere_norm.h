@@ -30,6 +30,10 @@ class HemisphereNorm {
   /// hemisphere of `n` (unit). Coefficient i of function k is c[i * columns + k].
   void to_coordinates(const Vec3d& n, std::size_t columns, double* c) const;
 
+  /// Products 1/(2 pi) integral of f_i . f_k of RGB functions: element i (i + 1) / 2 + k, k <= i, of `products`.
+  /// `c` has columns R, G, B of function 0, then of 1, and so on; what it holds afterwards is not said.
+  void products(const Vec3d& n, std::size_t functions, std::vector<double>& c, std::vector<float>& products) const;
+
  private:
   struct Term {
     double factor;

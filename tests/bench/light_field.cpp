@@ -1,16 +1,25 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
-//   kiln_light_field distance        closed form against product Gauss quadrature
+//   kiln_light_field distance                            closed form against product Gauss quadrature
+//   kiln_light_field colours MODEL                      plain vertex colours, against meshoptimizer's WASM build
+//   kiln_light_field scale [VERTICES] [DEGREE] [RATIO]   time and memory of one simplification
+#include <sys/resource.h>
+
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "core/base/random.h"
 #include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/simplify.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/sampling.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/light_field_models.h"
 
 namespace kiln::bench {
 namespace {
@@ -102,13 +111,121 @@ void measure_distance(int degree) {
               degree, quadrature, table, single, per_vertex, all_in, quadrature / all_in, table / all_in);
 }
 
+double peak_megabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+Paint veins(const Vec3f& p) {
+  const float wood = noise(p, 0.11F), grain = noise(p, 0.03F);
+  return {.albedo = {0.3F + 0.5F * wood, 0.2F + 0.4F * wood * grain, 0.1F + 0.3F * grain},
+          .gloss = 0.1F + 0.5F * noise(p, 0.2F)};
+}
+
+/// Time and memory of one simplification to a share of the triangles.
+void measure_scale(std::uint32_t vertices, int degree, double ratio) {
+  Mesh mesh = relief_torus(static_cast<std::uint32_t>(std::lround(std::sqrt(vertices / 2.0))));
+  LitMesh lit{.mesh = mesh, .field = paint_light(mesh, degree, 0.02, veins)};
+  const auto count = static_cast<double>(mesh.position.size());
+  const auto target = static_cast<std::size_t>(ratio * static_cast<double>(mesh.triangles.size()));
+  mesh = {};
+  Threads threads;
+  const double before = process_seconds(), wall = wall_seconds();
+  const SimplifyResult out = simplify(std::move(lit), {.triangles = target}, threads);
+  const double seconds = process_seconds() - before;
+  std::printf(R"({"bench":"scale","vertices":%.0f,"degree":%d,"triangles":%zu,"cpu_seconds":%.2f,"seconds":%.2f,)"
+              R"("us_a_vertex":%.1f,"peak_mb":%.0f,"error":%.4f})"
+              "\n",
+              count, degree, out.lit.mesh.triangles.size(), seconds, wall_seconds() - wall, 1e6 * seconds / count,
+              peak_megabytes(), out.error);
+}
+
+void tell(const char* bench, const char* by, const LitMesh& truth, const LitMesh& found, double seconds,
+          Threads& threads) {
+  const LightFieldError e = compare(truth, found, threads);
+  std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%zu,"seconds":%.2f,)"
+              R"("light_error":%.4f,"distance_percent":%.4f})"
+              "\n",
+              bench, by, found.mesh.triangles.size(), found.field.degree,
+              found.mesh.position.size() * (24 + 12 * found.field.count()) + 12 * found.mesh.triangles.size(), seconds,
+              e.light, e.distance);
+  std::fflush(stdout);
+}
+
+template <class T>
+void put(std::ofstream& file, const std::vector<T>& values) {
+  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+}
+
+/// Through tests/bench/light_field_meshopt.mjs; nothing where there is no node.
+std::optional<LitMesh> simplify_meshopt(const LitMesh& lit, std::size_t triangles, float weight) {
+  const std::string in = "/tmp/kiln_light_field.in", out = "/tmp/kiln_light_field.out";
+  {
+    std::ofstream file(in, std::ios::binary);
+    std::vector<float> colours;
+    for (std::size_t v = 0; v < lit.field.vertices(); ++v) {
+      for (std::size_t c = 0; c < 3; ++c) colours.push_back(lit.field.of(v)[c * lit.field.count()] * 0.2820948F);
+    }
+    put(file, std::vector<std::uint32_t>{static_cast<std::uint32_t>(lit.mesh.position.size()),
+                                         static_cast<std::uint32_t>(lit.mesh.triangles.size()),
+                                         static_cast<std::uint32_t>(triangles)});
+    put(file, std::vector<float>{weight});
+    put(file, lit.mesh.position), put(file, colours), put(file, lit.mesh.triangles);
+  }
+  std::remove(out.c_str());
+  const std::string command = std::string("node ") + KILN_BENCH_FOLDER + "/light_field_meshopt.mjs " + in + ' ' + out;
+  if (std::system(command.c_str()) != 0) return std::nullopt;
+  std::ifstream file(out, std::ios::binary);
+  LitMesh found = lit;
+  found.mesh.triangles.clear();
+  for (Triangle t; file.read(reinterpret_cast<char*>(t.data()), sizeof t);) found.mesh.triangles.push_back(t);
+  found.mesh.part.assign(found.mesh.triangles.size(), 0);
+  drop_unused_vertices(found);
+  return found;
+}
+
+/// Plain vertex colours: ours against meshoptimizer's attribute-aware simplifier.
+void measure_colours(const std::string& model, const std::vector<std::size_t>& targets) {
+  Threads threads;
+  LitMesh lit{.mesh = load_model(model), .field = {}};
+  lit.field = bake_colours(lit.mesh, threads);
+  for (const std::size_t target : targets) {
+    for (const auto& [name, how] : {std::pair("edge", Collapse::edge), std::pair("half-edge", Collapse::half_edge)}) {
+      for (const double weight : {0.01, 0.1}) {
+        const double start = process_seconds();
+        const LitMesh found =
+            simplify(lit, {.triangles = target, .geometry_weight = weight, .collapse = how}, threads).lit;
+        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 5);
+        tell("colours", by.c_str(), lit, found, process_seconds() - start, threads);
+      }
+    }
+    for (const float weight : {0.0F, 0.1F, 0.3F, 1.0F, 3.0F}) {
+      const double start = process_seconds();
+      const auto found = simplify_meshopt(lit, target, weight);
+      if (!found) return;
+      const std::string by = "meshoptimizer, weight " + std::to_string(weight).substr(0, 4);
+      tell("colours", by.c_str(), lit, *found, process_seconds() - start, threads);
+    }
+  }
+}
+
 int main_of(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "distance") {
     for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
     return 0;
   }
-  return std::fprintf(stderr, "kiln_light_field distance\n"), 2;
+  const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
+  if (what == "scale") {
+    measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
+    return 0;
+  }
+  if (what == "colours" && argc > 2) {
+    measure_colours(argv[2], {17'400, 4'200, 1'000});
+    return 0;
+  }
+  return std::fprintf(stderr, "kiln_light_field distance | scale [VERTICES] [DEGREE] [RATIO] | colours MODEL\n"), 2;
 }
 
 }  // namespace
