@@ -165,7 +165,7 @@ const std::vector<std::uint32_t>& CollapseMesh::join(std::uint32_t gone, const E
   for (std::uint32_t i = 0; i < s.triangles; ++i)
     for (const std::uint32_t v : lit_.mesh.triangles[s.triangle[i]])
       if (v != s.from[i] && v != s.to[i]) others[i] = v;
-  moved_.clear();
+  turned_.clear();
   for (std::uint32_t i = 0; i < s.pairs; ++i) {
     const std::uint32_t v = s.from[i], w = s.to[i];
     std::uint32_t corner = head_[v];
@@ -175,7 +175,7 @@ const std::vector<std::uint32_t>& CollapseMesh::join(std::uint32_t gone, const E
       if (!gone_[corner / 3]) {
         lit_.mesh.triangles[corner / 3][corner % 3] = w;
         append(w, corner);
-        moved_.push_back(corner / 3);
+        turned_.push_back(2 * (corner / 3) + i);
       }
       corner = following;
     }
@@ -183,7 +183,7 @@ const std::vector<std::uint32_t>& CollapseMesh::join(std::uint32_t gone, const E
   }
   for (std::uint32_t i = 0; i < s.triangles; ++i) drop_gone(others[i]), drop_gone(s.to[i]);
   first_vertex_[gone] = kNone;
-  return moved_;
+  return turned_;
 }
 
 }  // namespace kiln

@@ -94,7 +94,7 @@ class CollapseMesh {
   std::vector<PointKind> kind_;
   std::vector<bool> gone_;
   std::size_t left_ = 0;
-  std::vector<std::uint32_t> mark_, ring_, common_, moved_;
+  std::vector<std::uint32_t> mark_, ring_, common_, turned_;
   std::uint32_t stamp_ = 0;
 };
 

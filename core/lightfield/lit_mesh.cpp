@@ -5,24 +5,9 @@
 #include "core/mesh/midpoint.h"
 
 namespace kiln {
-namespace {
-
-/// Calls visit(array of a, array of b) for every attribute that `b` has.
-template <class MeshA, class MeshB, class Visit>
-void each_pair(MeshA& a, MeshB& b, const Visit& visit) {
-  visit(a.position, b.position);
-  visit(a.normal, b.normal);
-  if (!b.uv0.empty()) visit(a.uv0, b.uv0);
-  if (!b.uv1.empty()) visit(a.uv1, b.uv1);
-  if (!b.color.empty()) visit(a.color, b.color);
-  if (!b.tangent.empty()) visit(a.tangent, b.tangent);
-}
-
-}  // namespace
-
 std::uint32_t append_vertex(LitMesh& to, const LitMesh& from, std::uint32_t vertex) {
   const auto index = static_cast<std::uint32_t>(to.mesh.position.size());
-  each_pair(to.mesh, from.mesh, [&](auto& a, const auto& b) {
+  each_attribute_of(to.mesh, from.mesh, [&](auto& a, const auto& b) {
     const auto copy = b[vertex];  // `a` may be `b`
     a.push_back(copy);
   });

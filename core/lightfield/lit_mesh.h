@@ -26,6 +26,17 @@ void each_attribute(AnyMesh& mesh, const Visit& visit) {
   if (!mesh.tangent.empty()) visit(mesh.tangent);
 }
 
+/// Calls visit(array of a, array of b) for every attribute that `b` has.
+template <class MeshA, class MeshB, class Visit>
+void each_attribute_of(MeshA& a, MeshB& b, const Visit& visit) {
+  visit(a.position, b.position);
+  visit(a.normal, b.normal);
+  if (!b.uv0.empty()) visit(a.uv0, b.uv0);
+  if (!b.uv1.empty()) visit(a.uv1, b.uv1);
+  if (!b.color.empty()) visit(a.color, b.color);
+  if (!b.tangent.empty()) visit(a.tangent, b.tangent);
+}
+
 /// Appends a copy of a vertex of `from` to `to`, which has the same attributes, or no vertices yet. Returns its index.
 std::uint32_t append_vertex(LitMesh& to, const LitMesh& from, std::uint32_t vertex);
 

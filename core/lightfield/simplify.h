@@ -40,7 +40,7 @@ struct CollapseStep {
 struct CollapseRecord {
   std::vector<CollapseStep> steps;
   std::vector<std::uint32_t> removed;  // triangles, which keep the corners they had
-  std::vector<std::uint32_t> turned;   // triangles with a corner that went from gone to kept
+  std::vector<std::uint32_t> turned;   // 2 triangle + i: its corner went from gone[i] to kept[i]
   LitMesh before;                      // vertices: of kept, step by step and pair by pair
   LitMesh all;                         // every vertex, and triangle, as it was last
 };
