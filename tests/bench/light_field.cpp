@@ -1,0 +1,234 @@
+// Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
+//   kiln_light_field distance                            closed form against product Gauss quadrature
+//   kiln_light_field colours MODEL                      plain vertex colours, against meshoptimizer's WASM build
+//   kiln_light_field scale [VERTICES] [DEGREE] [RATIO]   time and memory of one simplification
+#include <sys/resource.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "core/base/random.h"
+#include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/simplify.h"
+#include "core/sphere/quadrature.h"
+#include "core/sphere/sampling.h"
+#include "tests/bench/bench.h"
+#include "tests/bench/light_field_models.h"
+
+namespace kiln::bench {
+namespace {
+
+constexpr std::size_t kRing = 6;  // neighbours of a vertex, on average
+
+/// Nanoseconds of one call of `body`, the least of several rounds.
+template <class Body>
+double nanoseconds(int calls, const Body& body) {
+  double least = HUGE_VAL;
+  for (int round = 0; round < 7; ++round) {
+    const double start = thread_seconds();
+    for (int i = 0; i < calls; ++i) body(i);
+    least = std::min(least, thread_seconds() - start);
+  }
+  return 1e9 * least / calls;
+}
+
+/// The best that quadrature can do: functions upright already, harmonics at the nodes at hand.
+class TabulatedQuadrature {
+ public:
+  explicit TabulatedQuadrature(int degree) : count_(static_cast<std::size_t>(sh_count(degree + 1))) {
+    const int steps = 2 * degree + 1;
+    for (const QuadratureNode& node : gauss_legendre(degree + 1)) {
+      const double z = 0.5 * (node.x + 1), radius = std::sqrt(1 - z * z);
+      for (int k = 0; k < steps; ++k) {
+        const double phi = 2 * std::numbers::pi * k / steps;
+        values_.resize(values_.size() + count_);
+        evaluate_sh(degree + 1, Vec3d{radius * std::cos(phi), radius * std::sin(phi), z},
+                    values_.data() + values_.size() - count_);
+        weights_.push_back(0.5 * node.weight / steps);
+      }
+    }
+  }
+  double squared_norm(const double* rgb) const {  // coefficient i of channel c is rgb[4 i + c]
+    double sum = 0;
+    const double* y = values_.data();
+    for (const double weight : weights_) {
+      double value[4] = {};
+      for (std::size_t i = 0; i < count_; ++i)
+        for (std::size_t c = 0; c < 4; ++c) value[c] += y[i] * rgb[4 * i + c];
+      sum += weight * (value[0] * value[0] + value[1] * value[1] + value[2] * value[2]);
+      y += count_;
+    }
+    return sum;
+  }
+
+ private:
+  std::size_t count_;
+  std::vector<double> values_, weights_;
+};
+
+void measure_distance(int degree) {
+  const HemisphereNorm norm(degree);
+  const TabulatedQuadrature tabulated(degree);
+  const std::size_t count = norm.count();
+  Random random(1, 0);
+  std::vector<double> rgb(4 * count), ring(count * 3 * kRing), work;
+  for (double& x : rgb) x = random.uniform_double() - 0.5;
+  for (double& x : ring) x = random.uniform_double() - 0.5;
+  std::array<Vec3d, 64> normals;
+  for (Vec3d& n : normals) n = uniform_sphere({random.uniform_double(), random.uniform_double()});
+  volatile double sink = 0;
+  const auto normal = [&](int i) { return normals[static_cast<std::size_t>(i) % 64]; };
+  const double quadrature = nanoseconds(100, [&](int i) {
+    sink = squared_norm_by_quadrature(degree, normal(i), {rgb.data(), 3 * count});
+  });
+  const double table = nanoseconds(1000, [&](int) { sink = tabulated.squared_norm(rgb.data()); });
+  const double single = nanoseconds(1000, [&](int i) {
+    sink = squared_norm(norm, normal(i), {rgb.data(), 3 * count});
+  });
+  // All that a removed vertex needs for its half-edge candidates: the ring upright, and the products of all pairs.
+  const double per_vertex = nanoseconds(1000, [&](int i) {
+    work = ring;
+    norm.to_coordinates(normal(i), 3 * kRing, work.data());
+    double gram[kRing][kRing] = {};
+    for (std::size_t k = 0; k < count; ++k) {
+      const double* row = work.data() + k * 3 * kRing;
+      for (std::size_t a = 0; a < kRing; ++a)
+        for (std::size_t b = 0; b <= a; ++b)
+          for (std::size_t c = 0; c < 3; ++c) gram[a][b] += row[3 * a + c] * row[3 * b + c];
+    }
+    sink = gram[kRing - 1][0];
+  });
+  const double all_in = per_vertex / (kRing * (kRing - 2));  // each candidate leaves ring - 2 triangles
+  std::printf(R"({"bench":"distance","degree":%d,"quadrature_ns":%.0f,"tabulated_quadrature_ns":%.0f,"closed_ns":%.0f,)"
+              R"("vertex_ns":%.0f,"all_in_ns":%.0f,"ratio":%.1f,"ratio_to_tabulated":%.1f})"
+              "\n",
+              degree, quadrature, table, single, per_vertex, all_in, quadrature / all_in, table / all_in);
+}
+
+double peak_megabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+Paint veins(const Vec3f& p) {
+  const float wood = noise(p, 0.11F), grain = noise(p, 0.03F);
+  return {.albedo = {0.3F + 0.5F * wood, 0.2F + 0.4F * wood * grain, 0.1F + 0.3F * grain},
+          .gloss = 0.1F + 0.5F * noise(p, 0.2F)};
+}
+
+/// Time and memory of one simplification to a share of the triangles.
+void measure_scale(std::uint32_t vertices, int degree, double ratio) {
+  Mesh mesh = relief_torus(static_cast<std::uint32_t>(std::lround(std::sqrt(vertices / 2.0))));
+  LitMesh lit{.mesh = mesh, .field = paint_light(mesh, degree, 0.02, veins)};
+  const auto count = static_cast<double>(mesh.position.size());
+  const auto target = static_cast<std::size_t>(ratio * static_cast<double>(mesh.triangles.size()));
+  mesh = {};
+  Threads threads;
+  const double before = process_seconds(), wall = wall_seconds();
+  const SimplifyResult out = simplify(std::move(lit), {.triangles = target}, threads);
+  const double seconds = process_seconds() - before;
+  std::printf(R"({"bench":"scale","vertices":%.0f,"degree":%d,"triangles":%zu,"cpu_seconds":%.2f,"seconds":%.2f,)"
+              R"("us_a_vertex":%.1f,"peak_mb":%.0f,"error":%.4f})"
+              "\n",
+              count, degree, out.lit.mesh.triangles.size(), seconds, wall_seconds() - wall, 1e6 * seconds / count,
+              peak_megabytes(), out.error);
+}
+
+void tell(const char* bench, const char* by, const LitMesh& truth, const LitMesh& found, double seconds,
+          Threads& threads) {
+  const LightFieldError e = compare(truth, found, threads);
+  std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%zu,"seconds":%.2f,)"
+              R"("light_error":%.4f,"distance_percent":%.4f})"
+              "\n",
+              bench, by, found.mesh.triangles.size(), found.field.degree,
+              found.mesh.position.size() * (24 + 12 * found.field.count()) + 12 * found.mesh.triangles.size(), seconds,
+              e.light, e.distance);
+  std::fflush(stdout);
+}
+
+template <class T>
+void put(std::ofstream& file, const std::vector<T>& values) {
+  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+}
+
+/// Through tests/bench/light_field_meshopt.mjs; nothing where there is no node.
+std::optional<LitMesh> simplify_meshopt(const LitMesh& lit, std::size_t triangles, float weight) {
+  const std::string in = "/tmp/kiln_light_field.in", out = "/tmp/kiln_light_field.out";
+  {
+    std::ofstream file(in, std::ios::binary);
+    std::vector<float> colours;
+    for (std::size_t v = 0; v < lit.field.vertices(); ++v) {
+      for (std::size_t c = 0; c < 3; ++c) colours.push_back(lit.field.of(v)[c * lit.field.count()] * 0.2820948F);
+    }
+    put(file, std::vector<std::uint32_t>{static_cast<std::uint32_t>(lit.mesh.position.size()),
+                                         static_cast<std::uint32_t>(lit.mesh.triangles.size()),
+                                         static_cast<std::uint32_t>(triangles)});
+    put(file, std::vector<float>{weight});
+    put(file, lit.mesh.position), put(file, colours), put(file, lit.mesh.triangles);
+  }
+  std::remove(out.c_str());
+  const std::string command = std::string("node ") + KILN_BENCH_FOLDER + "/light_field_meshopt.mjs " + in + ' ' + out;
+  if (std::system(command.c_str()) != 0) return std::nullopt;
+  std::ifstream file(out, std::ios::binary);
+  LitMesh found = lit;
+  found.mesh.triangles.clear();
+  for (Triangle t; file.read(reinterpret_cast<char*>(t.data()), sizeof t);) found.mesh.triangles.push_back(t);
+  found.mesh.part.assign(found.mesh.triangles.size(), 0);
+  drop_unused_vertices(found);
+  return found;
+}
+
+/// Plain vertex colours: ours against meshoptimizer's attribute-aware simplifier.
+void measure_colours(const std::string& model, const std::vector<std::size_t>& targets) {
+  Threads threads;
+  LitMesh lit{.mesh = load_model(model), .field = {}};
+  lit.field = bake_colours(lit.mesh, threads);
+  for (const std::size_t target : targets) {
+    for (const auto& [name, how] : {std::pair("edge", Collapse::edge), std::pair("half-edge", Collapse::half_edge)}) {
+      for (const double weight : {0.01, 0.1}) {
+        const double start = process_seconds();
+        const LitMesh found =
+            simplify(lit, {.triangles = target, .geometry_weight = weight, .collapse = how}, threads).lit;
+        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 5);
+        tell("colours", by.c_str(), lit, found, process_seconds() - start, threads);
+      }
+    }
+    for (const float weight : {0.0F, 0.1F, 0.3F, 1.0F, 3.0F}) {
+      const double start = process_seconds();
+      const auto found = simplify_meshopt(lit, target, weight);
+      if (!found) return;
+      const std::string by = "meshoptimizer, weight " + std::to_string(weight).substr(0, 4);
+      tell("colours", by.c_str(), lit, *found, process_seconds() - start, threads);
+    }
+  }
+}
+
+int main_of(int argc, char** argv) {
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (what == "distance") {
+    for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
+    return 0;
+  }
+  const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
+  if (what == "scale") {
+    measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
+    return 0;
+  }
+  if (what == "colours" && argc > 2) {
+    measure_colours(argv[2], {17'400, 4'200, 1'000});
+    return 0;
+  }
+  return std::fprintf(stderr, "kiln_light_field distance | scale [VERTICES] [DEGREE] [RATIO] | colours MODEL\n"), 2;
+}
+
+}  // namespace
+}  // namespace kiln::bench
+
+int main(int argc, char** argv) { return kiln::bench::main_of(argc, argv); }
