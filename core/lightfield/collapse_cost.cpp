@@ -9,8 +9,9 @@
 namespace kiln {
 namespace {
 
-constexpr double kLengthUnit = 0.01;  // of the diagonal
-constexpr double kEvenness = 1e-9;    // of squared edge length beside Q: flat regions collapse short edges first
+// Of the diagonal. So that at the default weight neither light nor shape is paid for with the other: README.md.
+constexpr double kLengthUnit = 0.005;
+constexpr double kEvenness = 1e-9;  // of squared edge length beside Q: flat regions collapse short edges first
 
 double squared_diagonal(const std::vector<Vec3f>& position) {
   if (position.empty()) return 1;
@@ -150,24 +151,19 @@ CollapsePlan CollapseCost::plan(std::uint32_t p, std::uint32_t q) const {
        {std::pair(std::max(p, q), std::min(p, q)), std::pair(std::min(p, q), std::max(p, q))}) {
     const EdgeSides sides = mesh_.sides(gone, kept);
     const auto allowed = mesh_.allowed(gone, kept, sides);
-    if (how_ == Collapse::edge && allowed.elsewhere) {
-      const Vec3d from = mesh_.position(gone), to = mesh_.position(kept), edge = to - from, middle = (from + to) * 0.5;
-      const Vec3d least = least_point(quadric_[gone] + quadric_[kept], middle);
-      if (!(dot(edge, edge) > 0) || length(least - middle) > 2 * length(edge)) {
-        consider({.gone = gone, .kept = kept, .place = to_float(to), .sides = sides});
-        continue;
-      }
-      const double share = std::clamp(dot(least - from, edge) / dot(edge, edge), 0.0, 1.0);
-      consider({.gone = gone,
-                .kept = kept,
-                .place = to_float(least),
-                .share = static_cast<float>(share),
-                .moves = true,
-                .sides = sides});
-      break;  // the other way round is the same
-    }
     if (allowed.at_kept)
       consider({.gone = gone, .kept = kept, .place = to_float(mesh_.position(kept)), .sides = sides});
+    if (how_ == Collapse::half_edge || !allowed.elsewhere || gone < kept) continue;  // the other way round is the same
+    const Vec3d from = mesh_.position(gone), edge = mesh_.position(kept) - from, middle = from + edge * 0.5;
+    const Vec3d least = least_point(quadric_[gone] + quadric_[kept], middle);
+    if (!(dot(edge, edge) > 0) || length(least - middle) > 2 * length(edge)) continue;
+    const double share = std::clamp(dot(least - from, edge) / dot(edge, edge), 0.0, 1.0);  // section 4.3
+    consider({.gone = gone,
+              .kept = kept,
+              .place = to_float(least),
+              .share = static_cast<float>(share),
+              .moves = true,
+              .sides = sides});
   }
   return best;
 }
