@@ -77,9 +77,11 @@ void CollapseCost::update_point(std::uint32_t p) {
   });
   if (mesh_.kind(p) != PointKind::free) {
     for (const std::uint32_t x : neighbours) {
+      if (mesh_.kind(x) == PointKind::free) continue;
       const Vec3d other = mesh_.position(x);
-      if (mesh_.kind(x) != PointKind::free && mesh_.sides(p, x).crease)
-        q.add_line(other - at, cross(at, other), kBorderWeight);
+      const EdgeSides sides = mesh_.sides(p, x);
+      const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
+      if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
     }
   }
   quadric_[p] = q, area_[p] = area;
@@ -106,7 +108,8 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
   };
   const auto& position = mesh_.mesh().position;
   const Vec3d at = to_double(position[v]);
-  const std::size_t iw = index(w);
+  const bool partner = w != SurfacePoints::kNone;
+  const std::size_t iw = partner ? index(w) : 0;
   double sum = 0;
   mesh_.around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
     if (a == w || b == w) return;
@@ -114,7 +117,7 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
     const double area = 0.5 * length(cross(t[1] - t[0], t[2] - t[0]));
     const Vec3d weights = foot_barycentrics(t, at);
     const std::size_t i[] = {iw, index(a), index(b)};
-    const double x[] = {share * weights.x, weights.y, weights.z};
+    const double x[] = {partner ? share * weights.x : 0, weights.y, weights.z};
     double squared = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       squared += x[k] * x[k] * product(i[k], i[k]);
@@ -135,6 +138,12 @@ void CollapseCost::find_cost(CollapsePlan& plan) const {
       light += light_error(v, w, plan.share, place);
       if (plan.moves) light += light_error(w, v, 1 - plan.share, place);
     }
+    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+      if (!plan.sides.goes(v)) light += light_error(v, SurfacePoints::kNone, 0, place);
+    });
+    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+      if (plan.moves && !plan.sides.takes(w)) light += light_error(w, SurfacePoints::kNone, 0, place);
+    });
   }
   plan.cost = geometry_ * q.at(place) + light_ * light;
   plan.order = plan.cost + even_ * (area_[plan.gone] + area_[plan.kept]) * dot(edge, edge);

@@ -49,6 +49,8 @@ class CollapseCost {
     std::vector<float> product;       // of neighbours i >= k: i (i + 1) / 2 + k
   };
   void find_cost(CollapsePlan&) const;
+  /// Of the triangles around v, when v at `place` has the light (1 - share) v + share w. w may be kNone: then that of
+  /// v.
   double light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
 
   const CollapseMesh& mesh_;

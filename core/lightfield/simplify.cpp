@@ -81,15 +81,19 @@ class Simplifier {
 
   void join(const CollapsePlan& plan) {
     squared_error_ += plan.cost;
+    moving_.clear();
+    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+      if (!plan.sides.goes(v)) moving_.push_back(v);
+    });
+    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+      if (plan.moves) moving_.push_back(w);
+    });
     if (params_.record) note_before(plan);
-    if (plan.moves) {
-      for (std::uint32_t i = 0; i < plan.sides.pairs; ++i) {
-        draw_towards(lit_, plan.sides.to[i], plan.sides.from[i], plan.share);
-        lit_.mesh.position[plan.sides.to[i]] = plan.place;
-      }
-    }
-    const auto& turned = mesh_.join(plan.gone, plan.sides);
-    if (params_.record) note_after(plan, turned);
+    for (std::uint32_t i = 0; plan.moves && i < plan.sides.pairs; ++i)
+      draw_towards(lit_, plan.sides.to[i], plan.sides.from[i], plan.share);
+    for (const std::uint32_t v : moving_) lit_.mesh.position[v] = plan.place;
+    const CollapseMesh::Joined& joined = mesh_.join(plan.gone, plan.kept, plan.sides);
+    if (params_.record) note_after(plan, joined);
     renew(plan);
   }
 
@@ -113,16 +117,19 @@ class Simplifier {
 
   void note_before(const CollapsePlan& plan) {
     CollapseRecord& r = out_.record;
-    for (std::uint32_t i = 0; plan.moves && i < plan.sides.pairs; ++i) append_vertex(r.before, lit_, plan.sides.to[i]);
+    for (const std::uint32_t v : moving_) append_vertex(r.before, lit_, v);
+    r.moved.insert(r.moved.end(), moving_.begin(), moving_.end());
     for (std::uint32_t i = 0; i < plan.sides.triangles; ++i) r.removed.push_back(plan.sides.triangle[i]);
   }
-  void note_after(const CollapsePlan& plan, const std::vector<std::uint32_t>& turned) {
+  void note_after(const CollapsePlan& plan, const CollapseMesh::Joined& joined) {
     CollapseRecord& r = out_.record;
-    r.turned.insert(r.turned.end(), turned.begin(), turned.end());
+    r.turned.insert(r.turned.end(), joined.turned.begin(), joined.turned.end());
+    r.orphans.insert(r.orphans.end(), joined.orphans.begin(), joined.orphans.end());
     r.steps.push_back({.pairs = plan.sides.pairs,
                        .gone = plan.sides.from,
                        .kept = plan.sides.to,
-                       .moved = plan.moves,
+                       .orphans = r.orphans.size(),
+                       .moved = r.moved.size(),
                        .removed = r.removed.size(),
                        .turned = r.turned.size(),
                        .error = static_cast<float>(std::sqrt(squared_error_))});
@@ -155,7 +162,7 @@ class Simplifier {
   std::vector<std::uint32_t> age_;  // of a point: how often its candidates were renewed
   CollapseQueue queue_;
   double squared_error_ = 0;
-  std::vector<std::uint32_t> changed_;
+  std::vector<std::uint32_t> changed_, moving_;  // points and vertices of the collapse at hand
   SimplifyResult out_;
 };
 

@@ -28,20 +28,21 @@ struct Simplify {
   bool record = false;  // of every collapse, for progressive_mesh()
 };
 
-/// What a collapse took away. Indices are of SimplifyResult::all.
+/// What a collapse took away. Indices are of CollapseRecord::all.
 struct CollapseStep {
   std::uint32_t pairs = 1;  // vertices gone[i] went into kept[i]
   std::array<std::uint32_t, 2> gone{}, kept{};
-  bool moved = false;                   // kept had other attributes before: the next rows of CollapseRecord::before
-  std::size_t removed = 0, turned = 0;  // ends of this step in CollapseRecord::removed and ::turned
-  float error = 0;                      // SimplifyResult::error once this step was done
+  std::size_t orphans = 0, moved = 0, removed = 0, turned = 0;  // ends of this step in the arrays of CollapseRecord
+  float error = 0;                                              // SimplifyResult::error once this step was done
 };
 
 struct CollapseRecord {
   std::vector<CollapseStep> steps;
+  std::vector<std::uint32_t> orphans;  // vertices without a triangle left
+  std::vector<std::uint32_t> moved;    // vertices that got other attributes,
+  LitMesh before;                      // and what they were: a vertex for each element of `moved`
   std::vector<std::uint32_t> removed;  // triangles, which keep the corners they had
   std::vector<std::uint32_t> turned;   // 2 triangle + i: its corner went from gone[i] to kept[i]
-  LitMesh before;                      // vertices: of kept, step by step and pair by pair
   LitMesh all;                         // every vertex, and triangle, as it was last
 };
 

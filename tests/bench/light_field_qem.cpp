@@ -161,7 +161,7 @@ class ColourQem {
       place_[plan.kept] = plan.best;
     }
     quadric_[plan.kept] += quadric_[plan.gone];
-    mesh_.join(point(plan.gone), sides);
+    mesh_.join(point(plan.gone), point(plan.kept), sides);
     ++age_[plan.gone], ++age_[plan.kept];
     push_around(plan.kept, false);
   }
