@@ -9,6 +9,10 @@
 namespace kiln {
 namespace {
 
+/// A cost counts the change at one point for all of the triangles around it. There it falls to nothing at their other
+/// corners: the mean square of such a hat over a triangle is a sixth of its height's.
+double relative_error(double summed_cost) { return std::sqrt(summed_cost / 6); }
+
 class Simplifier {
  public:
   Simplifier(LitMesh lit, const Simplify& params, Threads& threads)
@@ -30,9 +34,9 @@ class Simplifier {
       if (age_[c.a] + age_[c.b] != c.age) continue;
       const CollapsePlan plan = cost_.plan(c.a, c.b);
       if (!may_join(plan)) continue;  // it comes again when something around it changes
-      if (std::sqrt(squared_error_ + plan.cost) > params_.max_error) break;
+      if (relative_error(summed_cost_ + plan.cost) > params_.max_error) break;
       join(plan);
-      if (queue_.size() > 6 * mesh_.triangles_left() + 1024) drop_stale();
+      if (queue_.size() > 3 * mesh_.triangles_left() + 1024) drop_stale();  // half of it is alive
     }
     return finish();
   }
@@ -80,7 +84,7 @@ class Simplifier {
   }
 
   void join(const CollapsePlan& plan) {
-    squared_error_ += plan.cost;
+    summed_cost_ += plan.cost;
     moving_.clear();
     mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
       if (!plan.sides.goes(v)) moving_.push_back(v);
@@ -132,11 +136,11 @@ class Simplifier {
                        .moved = r.moved.size(),
                        .removed = r.removed.size(),
                        .turned = r.turned.size(),
-                       .error = static_cast<float>(std::sqrt(squared_error_))});
+                       .error = static_cast<float>(relative_error(summed_cost_))});
   }
 
   SimplifyResult finish() {
-    out_.error = std::sqrt(squared_error_);
+    out_.error = relative_error(summed_cost_);
     out_.reached = mesh_.triangles_left() <= params_.triangles;
     if (params_.record) out_.record.all = lit_;
     std::size_t kept = 0;
@@ -161,7 +165,7 @@ class Simplifier {
   CollapseCost cost_;
   std::vector<std::uint32_t> age_;  // of a point: how often its candidates were renewed
   CollapseQueue queue_;
-  double squared_error_ = 0;
+  double summed_cost_ = 0;
   std::vector<std::uint32_t> changed_, moving_;  // points and vertices of the collapse at hand
   SimplifyResult out_;
 };

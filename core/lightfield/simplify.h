@@ -2,9 +2,9 @@
 // Simplification that sees light: edges collapse in the order of what they change of the radiance towards every eye.
 //
 // The collapse that costs least (collapse_cost.h) goes first. It is refused where it would change the topology, turn a
-// triangle over, pull a border or seam off its line, or let creases join; so a target may be out of reach, and the
-// result says how far it came. The new vertex lies where the quadrics are least; its normal, light and other attributes
-// are those of the nearest place on the edge. Vertices at one position move together (surface_points.h).
+// triangle over, or let creases join; so a target may be out of reach, and the result says how far it came. The new
+// vertex lies where the quadrics are least or at either end; its normal, light and other attributes are those of the
+// nearest place on the edge. Vertices at one position move together (surface_points.h, collapse_mesh.h).
 // Paper    Vanhoey et al. 2015, section 4.   Units  of Mesh and LightField
 // Cost     n log n; README.md has times and memory
 // Repeat   same bits for any number of threads: they only prepare the first costs
@@ -48,7 +48,7 @@ struct CollapseRecord {
 
 struct SimplifyResult {
   LitMesh lit;
-  double error = 0;      // sqrt of the summed costs: an estimate of the relative RMS error, see README.md
+  double error = 0;      // an estimate, from the costs, of the relative RMS error of light and shape: README.md
   bool reached = false;  // the asked number of triangles
   CollapseRecord record;
 };

@@ -1,11 +1,6 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
-//   kiln_light_field distance                            closed form against product Gauss quadrature
-//   kiln_light_field candidate                           the cost of a candidate collapse
-//   kiln_light_field colours MODEL                      plain vertex colours, against meshoptimizer's WASM build
-//   kiln_light_field figure7 MODEL [DEGREE] [LESS]       equal memory: fewer vertices against fewer bands
-//   kiln_light_field figure8                             diffuse and specular stripes, against colour quadrics
-//   kiln_light_field figure9 MODEL                       diffuse veins, against colour quadrics
-//   kiln_light_field scale [VERTICES] [DEGREE] [RATIO]   time and memory of one simplification
+//   kiln_light_field all MODELS                          the tables of core/lightfield/README.md; MODELS is
+//   shared/models kiln_light_field scale VERTICES [DEGREE] [RATIO]     time and memory of one simplification
 #include <sys/resource.h>
 
 #include <array>
@@ -175,14 +170,23 @@ double bytes_of(const LitMesh& lit) {
   return static_cast<double>(lit.mesh.position.size() * (24 + 12 * lit.field.count()) + 12 * lit.mesh.triangles.size());
 }
 
-void tell(const char* bench, const char* by, const LitMesh& truth, const LitMesh& found, double seconds) {
+/// `estimate`: SimplifyResult::error, of ours.
+void tell(const char* bench, const std::string& by, const LitMesh& truth, const LitMesh& found, double seconds,
+          double estimate = 0) {
   const LightFieldError e = compare(truth, found);
   std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%.0f,"seconds":%.2f,)"
-              R"("light_error":%.4f,"distance_percent":%.4f})"
+              R"("light_error":%.4f,"distance_percent":%.4f,"estimate":%.4f})"
               "\n",
-              bench, by, found.mesh.triangles.size(), found.field.degree, bytes_of(found), seconds, e.light,
-              e.distance);
+              bench, by.c_str(), found.mesh.triangles.size(), found.field.degree, bytes_of(found), seconds, e.light,
+              e.distance, estimate);
   std::fflush(stdout);
+}
+
+void tell_ours(const char* bench, const std::string& by, const LitMesh& truth, const Simplify& params) {
+  Threads threads;
+  const double start = process_seconds();
+  const SimplifyResult out = simplify(truth, params, threads);
+  tell(bench, by, truth, out.lit, process_seconds() - start, out.error);
 }
 
 /// Plain vertex colours: ours against meshoptimizer's attribute-aware simplifier.
@@ -193,11 +197,8 @@ void measure_colours(const std::string& model, const std::vector<std::size_t>& t
   for (const std::size_t target : targets) {
     for (const auto& [name, how] : {std::pair("edge", Collapse::edge), std::pair("half-edge", Collapse::half_edge)}) {
       for (const double weight : {0.01, 0.1}) {
-        const double start = process_seconds();
-        const LitMesh found =
-            simplify(lit, {.triangles = target, .geometry_weight = weight, .collapse = how}, threads).lit;
-        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 5);
-        tell("colours", by.c_str(), lit, found, process_seconds() - start);
+        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 4);
+        tell_ours("colours", by, lit, {.triangles = target, .geometry_weight = weight, .collapse = how});
       }
     }
     for (const float weight : {0.0F, 0.1F, 0.3F, 1.0F, 3.0F}) {
@@ -205,24 +206,21 @@ void measure_colours(const std::string& model, const std::vector<std::size_t>& t
       const auto found = simplify_meshopt(lit, target, weight);
       if (!found) return;
       const std::string by = "meshoptimizer, weight " + std::to_string(weight).substr(0, 4);
-      tell("colours", by.c_str(), lit, *found, process_seconds() - start);
+      tell("colours", by, lit, *found, process_seconds() - start);
     }
   }
 }
 
 /// Ours and extended quadrics on mean colours at the same number of triangles; the rival at its best weight.
 void measure_against_colours(const char* bench, const LitMesh& lit, double ratio, Collapse how) {
-  Threads threads;
   const auto target = static_cast<std::size_t>(ratio * static_cast<double>(lit.mesh.triangles.size()));
   const std::string name = how == Collapse::edge ? "edge" : "half-edge";
-  double start = process_seconds();
-  const LitMesh ours = simplify(lit, {.triangles = target, .collapse = how}, threads).lit;
-  tell(bench, ("ours, " + name).c_str(), lit, ours, process_seconds() - start);
+  tell_ours(bench, "ours, " + name, lit, {.triangles = target, .collapse = how});
   for (const double weight : {0.01, 0.03, 0.1, 0.3, 1.0}) {
-    start = process_seconds();
+    const double start = process_seconds();
     const LitMesh rival = simplify_colour_qem(lit, target, how, weight);
     const std::string by = "colour quadrics, " + name + ", weight " + std::to_string(weight).substr(0, 4);
-    tell(bench, by.c_str(), lit, rival, process_seconds() - start);
+    tell(bench, by, lit, rival, process_seconds() - start);
   }
 }
 
@@ -239,12 +237,8 @@ void measure_degrees(const std::string& model, int degree, int less) {
   tell("figure 7", "degree reduction", lit, reduced, 0);
   const double bytes = bytes_of(reduced), whole = bytes_of(lit);
   const auto target = static_cast<std::size_t>(bytes / whole * static_cast<double>(lit.mesh.triangles.size()));
-  for (const auto& [name, how] :
-       {std::pair("ours, edge", Collapse::edge), std::pair("ours, half-edge", Collapse::half_edge)}) {
-    const double start = process_seconds();
-    const SimplifyResult out = simplify(lit, {.triangles = target, .collapse = how}, threads);
-    tell("figure 7", name, lit, out.lit, process_seconds() - start);
-  }
+  tell_ours("figure 7", "ours, edge", lit, {.triangles = target});
+  tell_ours("figure 7", "ours, half-edge", lit, {.triangles = target, .collapse = Collapse::half_edge});
 }
 
 /// Figure 8: diffuse stripes on a specular sphere; of a paint of their own, and of one that sends the same mean colour.
@@ -287,41 +281,30 @@ void measure_diffuse(const std::string& model) {
       measure_against_colours("figure 9", lit, ratio, how);
 }
 
+/// The tables of core/lightfield/README.md but for a million vertices, whose memory is measured alone.
+void measure_all(const std::string& models) {
+  for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
+  for (const int degree : {0, 2, 4, 6, 8}) measure_candidate(degree);
+  const std::string bunny = models + "/scenes/bunny/bun_zipper.ply";
+  measure_colours(bunny, {17'400, 4'200, 1'000});
+  measure_degrees(models + "/scenes/buddha/buddha.glb", 8, 3);
+  measure_degrees(bunny, 6, 2);
+  measure_stripes();
+  measure_diffuse(models + "/scenes/skull/skull.glb");
+  measure_scale(100'000, 4, 0.25);
+}
+
 int main_of(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  if (what == "distance") {
-    for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
-    return 0;
-  }
-  const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
-  if (what == "candidate") {
-    for (const int degree : {0, 2, 4, 6, 8}) measure_candidate(degree);
-    return 0;
-  }
-  if (what == "scale") {
+  const std::string what = argc > 2 ? argv[1] : "";
+  if (what == "all") {
+    measure_all(argv[2]);
+  } else if (what == "scale") {
+    const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
     measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
-    return 0;
+  } else {
+    return std::fprintf(stderr, "kiln_light_field all MODELS | scale VERTICES [DEGREE] [RATIO]\n"), 2;
   }
-  if (what == "colours" && argc > 2) {
-    measure_colours(argv[2], {17'400, 4'200, 1'000});
-    return 0;
-  }
-  if (what == "figure7" && argc > 2) {
-    measure_degrees(argv[2], static_cast<int>(number(3, 8)), static_cast<int>(number(4, 3)));
-    return 0;
-  }
-  if (what == "figure8") {
-    measure_stripes();
-    return 0;
-  }
-  if (what == "figure9" && argc > 2) {
-    measure_diffuse(argv[2]);
-    return 0;
-  }
-  return std::fprintf(stderr,
-                      "kiln_light_field distance | candidate | scale | colours MODEL | figure7 MODEL | figure8 | "
-                      "figure9 MODEL\n"),
-         2;
+  return 0;
 }
 
 }  // namespace
