@@ -117,9 +117,11 @@ class PrimitiveBuilder {
     add({"_ALBEDO", true, false}, original_color(material.base_color));
   }
 
-  void add_coefficients(const StoredTransfer& transfer) {
+  /// `name(k)` is that of VEC4 k.
+  template <class Name>
+  void add_coefficients(const StoredTransfer& transfer, const Name& name) {
     for (std::size_t k = 0; k < vec4s_of(transfer.form().count()); ++k) {
-      add({transfer.name(k), true, false},
+      add({name(k), true, false},
           {StreamKind::generic, 4, transfer.bits(k), {-1, -1, -1, -1}, 2, transfer.pack(k, vertices_)});
     }
   }
@@ -187,7 +189,9 @@ Result<void> visit_part_primitives(const BakedScene& baked, const GeometryOption
     PrimitiveBuilder builder(baked, static_cast<std::uint32_t>(part), std::move(meshes[part]));
     builder.add_geometry(options.encoding);
     builder.add_colors(colors);
-    if (options.transfer) builder.add_coefficients(*options.transfer);
+    if (options.transfer)
+      builder.add_coefficients(*options.transfer, [&](std::size_t k) { return options.transfer->name(k); });
+    if (options.field) builder.add_coefficients(*options.field, field_name);
     if (options.glossy) builder.add_matrices(*options.glossy);
     if (auto done = visit(builder.take()); !done) return done;
   }

@@ -39,9 +39,9 @@ std::vector<double> numbers(const json& array, const std::string& place, std::si
   return out;
 }
 
-void check_conventions(const Fields& extension, Findings& findings) {
-  if (extension.count("version", 0) != 2) {
-    findings.fail("unsupported_version", "Only version 2 of KILN_radiance_transfer is read.",
+void check_conventions(const Fields& extension, std::uint64_t version, Findings& findings) {
+  if (extension.count("version", 0) != version) {
+    findings.fail("unsupported_version", "Only version " + std::to_string(version) + " of the extension is read.",
                   extension.pointer("version"));
   }
   if (extension.text("basis") != "real-sh" || extension.flag("condonShortley", true)) {
@@ -81,28 +81,49 @@ void check_attribute_names(const Fields& extension, const auto& name_of, std::si
   }
 }
 
-/// Leaves `form` raw, or with rows of zeros for the caller to fill.
-void read_form(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+/// How numbers of a shape come from VEC4s. Leaves it raw, or with rows of zeros for the caller to fill from `view`.
+template <class Name>
+StoredForm read_form(const json& root, const Fields& extension, const Transfer& shape, const Name& name_of, int& view,
+                     Findings& findings) {
+  StoredForm out;
   if (const std::string form = extension.text("form"); form == "components") {
     const Fields components = extension.object("components");
     const std::uint64_t rank = components.count("rank", 0);
-    if (rank < 1 || rank > out.shape.stride()) {
+    if (rank < 1 || rank > shape.stride()) {
       findings.fail("number_out_of_range", "There must be at least one component, and no more than slots.",
                     components.pointer("rank"));
-      return;
+      return out;
     }
-    out.components_view = components.index("bufferView", 1u << 30);
-    out.form.components = {out.shape.stride(), std::vector<float>((rank + 1) * out.shape.stride())};
+    view = components.index("bufferView", 1u << 30);
+    out.components = {shape.stride(), std::vector<float>((rank + 1) * shape.stride())};
   } else if (form != "raw") {
     findings.fail("not_a_baked_scene", "The form must be raw or components.", extension.pointer("form"));
-    return;
+    return out;
   }
-  const std::size_t count = out.form.expected_count(out.shape);
-  check_attribute_names(
-      extension, [&](std::size_t k) { return stored_name(out.shape, k); }, count, findings);
-  const std::string scale = std::string(kPlace) + "/scale", offset = std::string(kPlace) + "/offset";
-  out.form.scale = numbers(at(root, scale), scale, count, findings);
-  out.form.offset = numbers(at(root, offset), offset, count, findings);
+  const std::size_t count = out.expected_count(shape);
+  check_attribute_names(extension, name_of, count, findings);
+  const std::string scale = extension.pointer("scale"), offset = extension.pointer("offset");
+  out.scale = numbers(at(root, scale), scale, count, findings);
+  out.offset = numbers(at(root, offset), offset, count, findings);
+  return out;
+}
+
+constexpr const char* kFieldPlace = "/extensions/KILN_light_field";
+
+/// The r-RFs, if there are any.
+void read_field(const json& root, BakedHeader& out, Findings& findings) {
+  if (!at(root, kFieldPlace).is_object()) return;
+  const Fields extension(at(root, kFieldPlace), kFieldPlace, findings);
+  check_conventions(extension, 1, findings);
+  if (!extension.flag("reflected", false))
+    findings.fail("not_a_baked_scene", "Radiance functions must be reflected.", extension.pointer("reflected"));
+  const std::uint64_t degree = extension.count("degree", kMaxLightFieldDegree + 1);
+  if (degree > kMaxLightFieldDegree)
+    findings.fail("number_out_of_range", "The degree must be 0 to 8.", extension.pointer("degree"));
+  if (findings.failed()) return;
+  out.has_field = true;
+  out.field_shape = field_shape(static_cast<int>(degree));
+  out.field_form = read_form(root, extension, out.field_shape, field_name, out.field_view, findings);
 }
 
 /// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.
@@ -187,10 +208,12 @@ BakedHeader read_baked_header(std::span<const std::uint8_t> text, Findings& find
     return out;
   }
   const Fields extension(at(root, kPlace), kPlace, findings);
-  check_conventions(extension, findings);
+  check_conventions(extension, 2, findings);
   out.shape = read_shape(extension, findings);
   if (findings.failed()) return out;
-  read_form(root, extension, out, findings);
+  const auto name = [&](std::size_t k) { return stored_name(out.shape, k); };
+  out.form = read_form(root, extension, out.shape, name, out.components_view, findings);
+  read_field(root, out, findings);
   read_glossy(root, extension, out, findings);
   out.light = read_light(root, extension, out.shape.order, findings);
   out.exposure = read_exposure(extension, findings);

@@ -1,5 +1,5 @@
 #pragma once
-// The JSON side of a scene.glb: what the KILN_radiance_transfer extensions say.
+// The JSON side of a scene.glb: what the KILN_radiance_transfer and KILN_light_field extensions say.
 
 #include <cstdint>
 #include <span>
@@ -21,7 +21,11 @@ struct BakedHeader {
   Transfer shape;            // order, channels, fixed; no coefficients
   StoredForm form;           // of components only the shape: their numbers are in a buffer view
   int components_view = -1;  // checked against the buffer views by the caller; -1: raw
-  GlossyTransfer glossy;     // its shape; of rank 0 (and order 0) where there are no matrices
+  bool has_field = false;    // r-RFs
+  Transfer field_shape;      // as they are stored: order is their degree + 1
+  StoredForm field_form;
+  int field_view = -1;    // checked as components_view
+  GlossyTransfer glossy;  // its shape; of rank 0 (and order 0) where there are no matrices
   StoredForm glossy_form;
   int glossy_view = -1, lobes_view = -1;  // checked as components_view
   BakedLight light;

@@ -136,13 +136,14 @@ void check_geometry(const Mesh& mesh, std::size_t first, const std::string& plac
   }
 }
 
-void read_coefficients(const BakedFile& file, StreamReader& streams, std::size_t first, std::size_t vertices,
-                       Transfer& out) {
-  const StoredForm& form = file.header.form;
+/// Vectors of one shape, stored in one form under `name(k)`.
+template <class Name>
+void read_coefficients(const StoredForm& form, StreamReader& streams, const Name& name, std::size_t first,
+                       std::size_t vertices, Transfer& out) {
   const std::size_t count = form.count();
   std::vector<float> numbers(vertices * count);
   for (std::size_t k = 0; k < vec4s_of(count); ++k) {
-    const std::vector<float> stored = streams.take(stored_name(file.header.shape, k), 4);
+    const std::vector<float> stored = streams.take(name(k), 4);
     for (std::size_t j = 4 * k; j < std::min(4 * k + 4, count); ++j) {
       for (std::size_t v = 0; v < vertices; ++v)
         numbers[v * count + j] =
@@ -171,7 +172,7 @@ void read_matrices(const BakedFile& file, StreamReader& streams, std::size_t fir
   }
 }
 
-void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& findings) {
+void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Transfer& field, Findings& findings) {
   DecodedMesh decoded = decode_part(file, i, findings);
   if (findings.failed()) return;
   Mesh& mesh = out.scene.mesh;
@@ -193,7 +194,10 @@ void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Findings& 
   if (part.has_uv1) append_optional(mesh.uv1, first, streams.take("TEXCOORD_1", 2));
   if (part.has_tangent) append_optional(mesh.tangent, first, streams.take("TANGENT", 4));
   if (part.has_color) append_optional(mesh.color, first, streams.take_id(color, "COLOR_0", 4));
-  read_coefficients(file, streams, first, vertices, out.transfer);
+  const BakedHeader& h = file.header;
+  read_coefficients(
+      h.form, streams, [&](std::size_t k) { return stored_name(h.shape, k); }, first, vertices, out.transfer);
+  if (h.has_field) read_coefficients(h.field_form, streams, field_name, first, vertices, field);
   if (header.glossy) read_matrices(file, streams, first, vertices, out.glossy);
   check_geometry(mesh, first, place, findings);
   out.scene.parts.push_back(part);
@@ -277,10 +281,14 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.exposure = file.header.exposure;
   out.provenance = file.header.provenance;
   out.scene.frame = read_frame(file.document, findings);
-  for (std::size_t i = 0; i < file.header.parts.size() && !findings.failed(); ++i) read_part(file, i, out, findings);
+  Transfer field = file.header.field_shape;
+  for (std::size_t i = 0; i < file.header.parts.size() && !findings.failed(); ++i)
+    read_part(file, i, out, field, findings);
   if (findings.failed()) return out;
   fill_optional(out.scene.mesh);
-  if (!std::ranges::all_of(out.transfer.coefficients, [](float c) { return std::isfinite(c); })) {
+  out.field = {std::max(0, field.order - 1), std::move(field.coefficients)};
+  const auto finite = [](float c) { return std::isfinite(c); };
+  if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite)) {
     findings.fail("number_out_of_range", "A coefficient does not fit a float.");
   }
   if (!std::ranges::all_of(out.glossy.weights, [](float w) { return std::isfinite(w); }))
@@ -306,9 +314,12 @@ constexpr const char* kExtensionPlace = "/extensions/KILN_radiance_transfer";
 
 /// Fills the rows that the header names.
 void read_components(const gltf::BufferBytes& bytes, BakedHeader& header, Findings& findings) {
-  if (header.components_view < 0) return;
-  const std::string place = std::string(kExtensionPlace) + "/components/bufferView";
-  read_floats(bytes, header.components_view, place, header.form.components.rows, findings);
+  const auto read = [&](int view, const char* extension, StoredForm& form) {
+    if (view < 0) return;
+    read_floats(bytes, view, std::string(extension) + "/components/bufferView", form.components.rows, findings);
+  };
+  read(header.components_view, kExtensionPlace, header.form);
+  read(header.field_view, "/extensions/KILN_light_field", header.field_form);
 }
 
 /// The same for the matrices; returns the table of lobes that belongs to them.

@@ -169,4 +169,10 @@ std::vector<float> StoredGlossy::pack(std::size_t k, std::span<const std::uint32
   return numbers_->pack(k, rows);
 }
 
+StoredField::StoredField(const LightField& field, const Encoding& encoding, std::span<const std::uint32_t> vertices)
+    : shape_(field_shape(field.degree)) {
+  shape_.coefficients = field.coefficients;
+  numbers_.emplace(shape_, encoding.field, vertices);
+}
+
 }  // namespace kiln

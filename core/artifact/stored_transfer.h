@@ -24,6 +24,7 @@ namespace kiln {
 inline std::string stored_name(const Transfer& shape, std::size_t k) {
   return shape.order == 0 ? "_RADIOSITY" : "_PRT_" + std::to_string(k);
 }
+inline std::string field_name(std::size_t k) { return "_SLF_" + std::to_string(k); }
 inline std::string glossy_name(std::size_t k) { return "_GLOSSY_" + std::to_string(k); }
 
 inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
@@ -88,5 +89,21 @@ class StoredGlossy {
   Transfer one_number_;  // stands for the matrices' vertices
   std::optional<StoredTransfer> numbers_;
 };
+
+/// r-RFs on their way into a file: stored like transfer vectors of three channels.
+class StoredField {
+ public:
+  /// `vertices` as above.
+  StoredField(const LightField&, const Encoding&, std::span<const std::uint32_t> vertices);
+
+  const StoredTransfer& numbers() const { return *numbers_; }
+
+ private:
+  Transfer shape_;
+  std::optional<StoredTransfer> numbers_;
+};
+
+/// The shape under which r-RFs of a degree are stored.
+inline Transfer field_shape(int degree) { return {degree + 1, 3, false, {}}; }
 
 }  // namespace kiln

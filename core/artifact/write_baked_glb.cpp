@@ -21,6 +21,7 @@ using json = nlohmann::ordered_json;
 
 constexpr int kFloat = 5126, kUnsignedInt = 5125;
 constexpr const char* kTransfer = "KILN_radiance_transfer";
+constexpr const char* kField = "KILN_light_field";
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
 json vec(const Vec3f& v) { return {v.x, v.y, v.z}; }
@@ -39,6 +40,9 @@ void check_shape(const BakedScene& baked) {
     EXPECTS(baked.lobes.order == glossy.order && baked.lobes.numbers.size() == LobeTable::size_of(glossy.order));
     EXPECTS(!glossy.vertices.empty() && glossy.rank() >= 1 && glossy.components.stride == glossy.stride());
   }
+  const LightField& field = baked.field;
+  EXPECTS(field.coefficients.empty() ||
+          (field.degree <= kMaxLightFieldDegree && field.vertices() == mesh.position.size()));
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -54,9 +58,11 @@ class Writer {
     const auto has_matrix = [&](auto v) { return baked_.glossy.find(v) != GlossyTransfer::kNoMatrix; };
     if (baked_.glossy && encoding_.glossy && std::ranges::any_of(vertices, has_matrix))
       glossy_.emplace(baked_.glossy, encoding_, vertices);
+    if (!baked_.field.coefficients.empty()) field_.emplace(baked_.field, encoding_, vertices);
     if (const auto done = add_parts(); !done) return tl::make_unexpected(done.error());
     add_images();
-    add_components();
+    components_ = add_components(transfer_->form());
+    if (field_) field_components_ = add_components(field_->numbers().form());
     add_glossy();
     std::string text = document().dump(-1, ' ', false, json::error_handler_t::replace);
     return join_glb(std::move(text), std::move(binary_));
@@ -83,7 +89,8 @@ class Writer {
 
   Result<void> add_parts() {
     return visit_part_primitives(
-        baked_, {encoding_, &*transfer_, glossy_ ? &*glossy_ : nullptr}, [this](PartPrimitive part) -> Result<void> {
+        baked_, {encoding_, &*transfer_, glossy_ ? &*glossy_ : nullptr, field_ ? &field_->numbers() : nullptr},
+        [this](PartPrimitive part) -> Result<void> {
           const std::size_t triangles = part.mesh.triangles.size();
           KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
           KILN_TRY(decoded, decode_draco(bytes, {std::numeric_limits<std::uint32_t>::max(), triangles, true}));
@@ -153,11 +160,10 @@ class Writer {
     }
   }
 
-  /// The mean and the components, float32, little endian.
-  void add_components() {
-    const std::vector<float>& rows = transfer_->form().components.rows;
-    if (rows.empty()) return;
-    components_ = add_floats(rows);
+  /// The mean and the components, float32, little endian. Nothing for raw numbers.
+  std::optional<std::size_t> add_components(const StoredForm& form) {
+    if (form.raw()) return {};
+    return add_floats(form.components.rows);
   }
 
   /// The components of the matrices, and the table of lobes.
@@ -186,29 +192,38 @@ class Writer {
             {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *lobes_}}}};
   }
 
+  /// How numbers come from VEC4s: the same members for transfer vectors and r-RFs.
+  template <class Name>
+  static void put_form(json& out, const StoredForm& form, std::optional<std::size_t> components, const Name& name) {
+    json attributes = json::array();
+    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back(name(k));
+    out["form"] = form.raw() ? "raw" : "components";
+    out["attributes"] = attributes;
+    out["scale"] = form.scale;
+    out["offset"] = form.offset;
+    if (components) out["components"] = {{"rank", form.components.rank()}, {"bufferView", *components}};
+  }
+
   json transfer_extension() const {
     const Transfer& t = baked_.transfer;
-    const StoredForm& form = transfer_->form();
-    json attributes = json::array(), light = json::array();
-    for (std::size_t k = 0; k < vec4s_of(form.count()); ++k) attributes.push_back(transfer_->name(k));
+    json light = json::array();
     for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
-    json out = {{"version", 2},
-                {"basis", "real-sh"},
-                {"condonShortley", false},
-                {"frame", "world, +Y up"},
-                {"order", t.order},
-                {"channels", t.channels},
-                {"fixed", t.fixed},
-                {"slots", t.slots()},
-                {"form", form.raw() ? "raw" : "components"},
-                {"attributes", attributes},
-                {"scale", form.scale},
-                {"offset", form.offset},
-                {"light", {{"name", baked_.light.name}, {"coefficients", light}}},
-                {"look", {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}}},
-                {"units", "W m^-2 sr^-1"}};
-    if (components_) out["components"] = {{"rank", form.components.rank()}, {"bufferView", *components_}};
+    json out = {{"version", 2},     {"basis", "real-sh"},     {"condonShortley", false}, {"frame", "world, +Y up"},
+                {"order", t.order}, {"channels", t.channels}, {"fixed", t.fixed},        {"slots", t.slots()}};
+    put_form(out, transfer_->form(), components_, [&](std::size_t k) { return transfer_->name(k); });
+    out["light"] = {{"name", baked_.light.name}, {"coefficients", light}};
+    out["look"] = {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}};
+    out["units"] = "W m^-2 sr^-1";
     if (glossy_) out["glossy"] = glossy_extension();
+    return out;
+  }
+
+  json field_extension() const {
+    json out = {
+        {"version", 1},      {"basis", "real-sh"},           {"condonShortley", false}, {"frame", "world, +Y up"},
+        {"reflected", true}, {"degree", baked_.field.degree}};
+    put_form(out, field_->numbers().form(), field_components_, field_name);
+    out["units"] = "W m^-2 sr^-1";
     return out;
   }
 
@@ -236,6 +251,7 @@ class Writer {
   json extensions_used(const LookJson& look) const {
     std::vector<std::string> out = look.extensions;
     out.insert(out.end(), {kDraco, kTransfer});
+    if (field_) out.push_back(kField);
     std::ranges::sort(out);
     return out;
   }
@@ -249,6 +265,7 @@ class Writer {
     out["extensionsUsed"] = extensions_used(look);
     out["extensionsRequired"] = json::array({kDraco});
     out["extensions"][kTransfer] = transfer_extension();
+    if (field_) out["extensions"][kField] = field_extension();
     const json lights = json::parse(look.lights);
     if (!lights.empty()) out["extensions"]["KHR_lights_punctual"]["lights"] = lights;
     put_scenes(out, json::parse(look.light_nodes));
@@ -269,7 +286,8 @@ class Writer {
   const Encoding& encoding_;
   std::optional<StoredTransfer> transfer_;
   std::optional<StoredGlossy> glossy_;
-  std::optional<std::size_t> components_, glossy_rows_, lobes_;  // buffer views
+  std::optional<StoredField> field_;
+  std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_;  // buffer views
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();
   json baked_primitives_ = json::array(), original_primitives_ = json::array();

@@ -15,6 +15,8 @@
 #include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_step.h"
 #include "core/bake/job_light.h"
+#include "core/bake/light_field_certificate.h"
+#include "core/bake/light_field_step.h"
 #include "core/bake/lightings.h"
 #include "core/bake/links_step.h"
 #include "core/bake/plan.h"
@@ -87,6 +89,7 @@ Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Envir
   const Environment* sky = light ? &*light : nullptr;
   if (recipe.grid) return make_grid_plan(scene, recipe, sky, threads);
   if (recipe.transport) return make_links_plan(scene, recipe, sky, threads);
+  if (recipe.light_field) return make_light_field_plan(scene, recipe, sky, threads);
   if (recipe.radiosity) return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, sky, threads);
   return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
 }
@@ -112,29 +115,46 @@ struct Pass {
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
   std::optional<LinksOutcome> links;
+  std::optional<FieldReport> field;
   std::optional<GlossyReport> glossy;
 };
 
-/// The step `radiosity`, and where the plan has one the grid that looks at its surface.
-Result<Transfer> solve_light(const BakeInput& input, Scene& scene, const Environment* sky, Plan& plan,
-                             std::optional<GridOutcome>& grid, const LinksStep* links, BakeLog& log, Threads& threads) {
+/// What the steps that light the scene as `radiosity` does make besides.
+struct LitResults {
+  Transfer transfer;
+  std::optional<GridOutcome> grid;
+  std::optional<OutgoingLight> outgoing;
+};
+
+/// The step `radiosity`, and where the plan has one the grid or the light field that looks at its surface.
+Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Environment* sky, Plan& plan,
+                               const LinksStep* links, BakeLog& log, Threads& threads) {
   plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
+  LitResults out;
   Result<GridOutcome> outcome;
-  const auto bake_grid = [&](const Tracer& tracer, const LitSurface* surface) {
-    const GatherFaces faces(tracer.scene());
-    const SphereGather::World world{tracer, faces, surface, sky};
-    outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
-  };
   RadiosityHooks hooks;
-  if (plan.grid) hooks.lit = bake_grid;
+  hooks.lit = [&](const Tracer& tracer, const LitSurface* surface, std::span<const Vec3f> value) {
+    const GatherFaces faces(tracer.scene());
+    const IncidentLight::World world{tracer, faces, surface, sky};
+    if (plan.grid) outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
+    if (plan.field) {
+      log.begin("light field", 0.88);
+      out.outgoing = bake_light_field(world, value, plan, log, threads);
+    }
+  };
+  std::optional<FinishSource> finish;
   if (links != nullptr) {
     hooks.more = {links->columns(),
                   [&](std::span<const TransferPoint> points) { return links->values(points, threads); }};
+  } else if (plan.field) {
+    finish.emplace(scene);
+    hooks.more = {FinishSource::kWidth,
+                  [&](std::span<const TransferPoint> points) { return finish->values(points, threads); }};
   }
-  Transfer transfer = solve_radiosity_step(scene, plan, sky, hooks, log, threads);
+  out.transfer = solve_radiosity_step(scene, plan, sky, hooks, log, threads);
   if (!outcome) return tl::make_unexpected(outcome.error());
-  if (plan.grid) grid = std::move(*outcome);
-  return transfer;
+  if (plan.grid) out.grid = std::move(*outcome);
+  return out;
 }
 
 /// Leaves the refined surface in `scene`.
@@ -144,15 +164,17 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   BakedLight own;
   Transport transport;
   std::unique_ptr<LinksStep> links;
+  std::optional<OutgoingLight> outgoing;
   if (plan.radiosity) {
     if (light) own.name = light->name;
     if (plan.links) {
       log.begin("links", 0.4);
       links = std::make_unique<LinksStep>(scene, plan, input.recipe.seed, log, threads);
     }
-    KILN_TRY(transfer,
-             solve_light(input, scene, light ? &*light : nullptr, plan, pass.grid, links.get(), log, threads));
-    transport.transfer = std::move(transfer);
+    KILN_TRY(lit, solve_light(input, scene, light ? &*light : nullptr, plan, links.get(), log, threads));
+    transport.transfer = std::move(lit.transfer);
+    pass.grid = std::move(lit.grid);
+    outgoing = std::move(lit.outgoing);
   } else {
     if (light) own = {light->name, project_environment(*light, plan.order)};
     transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
@@ -165,6 +187,12 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   if (baked.glossy)
     encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
+  if (outgoing) {
+    pass.field.emplace(FieldReport{.degree = outgoing->field.degree, .noise = outgoing->noise});
+    encoding.field = choose_field_encoding(outgoing->field, baked.scene.mesh, plan);
+    pass.field->rank = encoding.field.components.rank();
+    baked.field = std::move(outgoing->field);
+  }
   const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.direct.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
@@ -185,6 +213,10 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
         decoded, truth, light,
         {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
     if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
+  }
+  if (pass.field && input.recipe.certificate) {
+    const Tracer truth(scene, threads);
+    pass.field->certificate = certify_field({decoded, truth, light, log.rays(), input.recipe.seed}, threads);
   }
   if (decoded.glossy) {
     pass.glossy = GlossyReport{.order = decoded.glossy.order,
@@ -307,6 +339,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .sources = pass.sources,
                                           .grid = pass.grid,
                                           .links = pass.links,
+                                          .field = pass.field,
                                           .glossy = pass.glossy,
                                           .passes = passes});
   BakeOutput output;

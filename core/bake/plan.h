@@ -11,6 +11,7 @@
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
+#include "core/lightfield/outgoing.h"
 #include "core/meshless/link_builder.h"
 #include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
@@ -23,6 +24,12 @@ struct Decision {
   std::string decision;  // "order", "bounces", ...
   std::string value;     // "6"
   std::string reason;
+};
+
+/// What the step `lightfield` will do beside `radiosity`.
+struct FieldPlan {
+  OutgoingBake outgoing;
+  double storage = 0.01;  // relRMSE that components and rounding may add
 };
 
 struct Plan {
@@ -44,6 +51,7 @@ struct Plan {
   std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
   std::optional<LinkParams> links;     // of the step `transport`; `radiosity` is there too
+  std::optional<FieldPlan> field;      // of the step `lightfield`; `radiosity` is there too
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

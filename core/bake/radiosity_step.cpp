@@ -235,14 +235,13 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
          "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
              " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
 
-  if (hooks.lit) hooks.lit(tracer, r.surface.get());
+  std::vector<Vec3f> light;
+  for (std::size_t v = 0; v < r.direct.size(); ++v) light.push_back(r.direct[v] + r.indirect[v]);
+  if (hooks.lit) hooks.lit(tracer, r.surface.get(), light);
 
   Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
-  out.coefficients.reserve(3 * r.direct.size());
-  for (std::size_t v = 0; v < r.direct.size(); ++v) {
-    const Vec3f x = r.direct[v] + r.indirect[v];
-    out.coefficients.insert(out.coefficients.end(), {x.x, x.y, x.z});
-  }
+  out.coefficients.reserve(3 * light.size());
+  for (const Vec3f& x : light) out.coefficients.insert(out.coefficients.end(), {x.x, x.y, x.z});
   return out;
 }
 

@@ -22,8 +22,8 @@ namespace kiln {
 /// direct light; reflected rays are priced as in forecast.h.
 Plan make_radiosity_plan(const Scene&, const RadiosityStep&, Quality, const Environment* sky, Threads&);
 
-/// Called while the solved surface stands: null where nothing is reflected.
-using OnLit = std::function<void(const Tracer&, const LitSurface*)>;
+/// Called while the solved surface stands (null where nothing is reflected), with the light of each vertex.
+using OnLit = std::function<void(const Tracer&, const LitSurface*, std::span<const Vec3f>)>;
 
 /// Other light that the mesh is refined for: `width` numbers for each place, 1 in the mean.
 struct MoreLight {

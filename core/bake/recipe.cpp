@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/bake/json_fields.h"
+#include "core/lightfield/light_field.h"
 #include "core/sphere/sh.h"
 
 namespace kiln {
@@ -157,6 +158,17 @@ TransportStep read_transport(JsonFields& fields, const std::string& pointer, Err
   return step;
 }
 
+LightFieldStep read_light_field(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  LightFieldStep step;
+  fields.word("basis", {"sh"});
+  if (const auto n = fields.integer_or_auto("degree", 0, kMaxLightFieldDegree)) step.degree = static_cast<int>(*n);
+  if (const auto n = fields.integer_or_auto("rays", 1, 65536)) step.rays = static_cast<int>(*n);
+  if (const auto n = fields.integer_or_auto("bounces", 0, 1000)) step.surface.bounces = static_cast<int>(*n);
+  if (const json* value = fields.find("subdivide"))
+    step.surface.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
+  return step;
+}
+
 std::optional<std::array<int, 3>> read_resolution(JsonFields& fields) {
   const json* field = fields.find("resolution");
   if (!field || *field == "auto") return std::nullopt;
@@ -208,13 +220,14 @@ ReduceStep read_reduce(JsonFields& fields) {
 bool read_step(const json& value, const std::string& pointer, Recipe& recipe, Errors& errors) {
   JsonFields fields(value, pointer, errors);
   if (!fields.find("do", true)) return false;
-  const auto step = fields.word("do", {"prt", "radiosity", "grid", "transport", "reduce"});
+  const auto step = fields.word("do", {"prt", "radiosity", "grid", "transport", "reduce", "lightfield"});
   if (!step) return false;
   if (*step == 0) recipe.steps.push_back(read_prt(fields, pointer, errors));
   if (*step == 1) recipe.radiosity = read_radiosity(fields, pointer, errors);
   if (*step == 2) recipe.grid = read_grid(fields);
   if (*step == 3) recipe.transport = read_transport(fields, pointer, errors);
   if (*step == 4) recipe.reduce = read_reduce(fields);
+  if (*step == 5) recipe.light_field = read_light_field(fields, pointer, errors);
   fields.finish();
   return *step == 4;
 }
@@ -232,7 +245,7 @@ void read_steps(const json& value, Recipe& recipe, Errors& errors) {
   if (errors.size() > before) return;
   if (!first || second) {
     errors.push_back({"/steps", "only reduce may come before another step, and once", shown(value),
-                      "reduce, then one of prt, radiosity, grid, transport"});
+                      "reduce, then one of prt, radiosity, grid, transport, lightfield"});
   }
 }
 
@@ -267,6 +280,10 @@ void check_promise(const Recipe& recipe, Errors& errors) {
   if (recipe.transport) {
     errors.push_back(
         {"/quality", "cannot be promised of a transport step: it is baked in one pass", "", "draft, standard, final"});
+  }
+  if (recipe.light_field) {
+    errors.push_back(
+        {"/quality", "cannot be promised of a lightfield step: it is baked in one pass", "", "draft, standard, final"});
   }
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
@@ -406,6 +423,15 @@ json step_json(const TransportStep& step) {
   return out;
 }
 
+json step_json(const LightFieldStep& step) {
+  return {{"do", "lightfield"},
+          {"basis", "sh"},
+          {"degree", or_auto(step.degree)},
+          {"rays", or_auto(step.rays)},
+          {"bounces", or_auto(step.surface.bounces)},
+          {"subdivide", subdivision_json(step.surface.subdivide)}};
+}
+
 json step_json(const GridStep& step) {
   json out = {{"do", "grid"},
               {"resolution", "auto"},
@@ -461,6 +487,7 @@ std::string recipe_json(const Recipe& recipe) {
   if (recipe.radiosity) out["steps"].push_back(step_json(*recipe.radiosity));
   if (recipe.grid) out["steps"].push_back(step_json(*recipe.grid));
   if (recipe.transport) out["steps"].push_back(step_json(*recipe.transport));
+  if (recipe.light_field) out["steps"].push_back(step_json(*recipe.light_field));
   if (!recipe.scene_asset.empty()) out["scene"] = {{"asset", recipe.scene_asset}};
   if (const json environment = environment_json(recipe.environment); !environment.is_null())
     out["environment"] = environment;
@@ -483,6 +510,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"grid"}],"environment":{"builtin":"clear"}})"},
       {"transport", "Reflected light of lights that move after the bake; the scene itself lit as by radiosity",
        R"({"steps":[{"do":"transport"}],"environment":{"builtin":"clear"}})"},
+      {"lightfield", "Radiance towards every eye under a courtyard's light: highlights move with the eye",
+       R"({"steps":[{"do":"lightfield"}],"environment":{"builtin":"courtyard"}})"},
       {"reduce", "A scan of any size down to a tenth, at most 200,000 triangles, with a normal map",
        R"({"steps":[{"do":"reduce"}]})"},
       {"lamps", "Only the scene's own emitters and lights", R"({"steps":[{"do":"prt"}]})"},

@@ -82,6 +82,13 @@ struct TransportStep {
   std::optional<int> sender_level;  // the finest level of points that send; auto when absent
 };
 
+/// Radiance towards every eye at the vertices (core/lightfield/outgoing.h), under the light of one job.
+struct LightFieldStep {
+  RadiosityStep surface;      // bounces and subdivision; the rest is automatic
+  std::optional<int> degree;  // bands 0 .. degree
+  std::optional<int> rays;    // of a vertex
+};
+
 /// Fewer triangles, and a normal map for what they do not hold (core/reduce/reduce.h).
 struct ReduceStep {
   std::optional<std::uint64_t> triangles;  // auto when this and `ratio` are absent
@@ -109,12 +116,13 @@ struct Limits {
 struct Recipe {
   std::string scene_asset;  // sha256; empty when the scene is given otherwise
   EnvironmentChoice environment;
-  std::vector<PrtStep> steps;              // one, or none where there is a
-  std::optional<RadiosityStep> radiosity;  // step `radiosity`
-  std::optional<GridStep> grid;            // step `grid`
-  std::optional<TransportStep> transport;  // step `transport`
-  std::optional<ReduceStep> reduce;        // step `reduce`: alone, or before one of the others
-  Quality quality = Quality::standard;     // where nothing is promised
+  std::vector<PrtStep> steps;                 // one, or none where there is a
+  std::optional<RadiosityStep> radiosity;     // step `radiosity`
+  std::optional<GridStep> grid;               // step `grid`
+  std::optional<TransportStep> transport;     // step `transport`
+  std::optional<LightFieldStep> light_field;  // step `lightfield`
+  std::optional<ReduceStep> reduce;           // step `reduce`: alone, or before one of the others
+  Quality quality = Quality::standard;        // where nothing is promised
   Promise promise;
   std::uint64_t seed = 0;
   Limits limits;
@@ -122,7 +130,7 @@ struct Recipe {
   bool certificate = true;
   std::string label;
 
-  bool bakes_light() const { return !steps.empty() || radiosity || grid || transport; }
+  bool bakes_light() const { return !steps.empty() || radiosity || grid || transport || light_field; }
 };
 
 /// Parses and checks a recipe. All mistakes at once.

@@ -94,7 +94,18 @@ std::string recipe_schema() {
         "samples": {"description": "rays of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"}
       }
     },
-    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}, {"$ref": "#/definitions/transport"}]},
+    "lightfield": {
+      "type": "object", "required": ["do"], "additionalProperties": false,
+      "properties": {
+        "do": {"enum": ["lightfield"]},
+        "basis": {"description": "spherical harmonics in world axes", "enum": ["sh"], "default": "sh"},
+        "degree": {"description": "bands 0 .. degree of radiance towards the eye; coefficients = (degree + 1)^2", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 8}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "rays": {"description": "of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "bounces": {"$ref": "#/definitions/gather_bounces"},
+        "subdivide": {"$ref": "#/definitions/subdivide"}
+      }
+    },
+    "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}, {"$ref": "#/definitions/transport"}, {"$ref": "#/definitions/lightfield"}]},
     "reduce": {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "not": {"required": ["triangles", "ratio"], "properties": {"triangles": {"type": "integer"}}},

@@ -167,6 +167,16 @@ ordered_json links_object(const LinksOutcome& links) {
           {"certificate", links_certificate_object(links.certificate)}};
 }
 
+ordered_json field_object(const FieldReport& f) {
+  ordered_json out = {{"degree", f.degree}, {"noise", f.noise}, {"rank", f.rank}, {"certificate", nullptr}};
+  if (!f.certificate) return out;
+  out["certificate"] = error_object(f.certificate->radiance);
+  out["certificate"]["points"] = f.certificate->points;
+  out["certificate"]["samples"] = f.certificate->samples;
+  out["certificate"]["seconds"] = f.certificate->seconds;
+  return out;
+}
+
 ordered_json glossy_object(const GlossyReport& g) {
   ordered_json out = {{"order", g.order}, {"channels", g.channels},       {"vertices", g.vertices},
                       {"rank", g.rank},   {"compression", g.compression}, {"noise", g.noise}};
@@ -210,6 +220,11 @@ ordered_json parameters_object(const Plan& plan) {
                       {"split", l.oracle.split},
                       {"largest", l.oracle.largest},
                       {"sender_level", l.sender_level < 0 ? ordered_json("auto") : ordered_json(l.sender_level)}};
+    }
+    if (plan.field) {
+      out["lightfield"] = {{"degree", plan.field->outgoing.degree},
+                           {"rays", plan.field->outgoing.rays},
+                           {"storage", plan.field->storage}};
     }
     if (plan.grid) out["grid"] = {{"size", plan.grid->size}, {"rays_per_vertex", plan.grid->rays}};
     return out;
@@ -302,6 +317,7 @@ std::string report_json(const ReportInput& in) {
   if (in.links) out["links"] = links_object(*in.links);
   if (in.recipe.promise)
     out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
+  if (in.field) out["lightfield"] = field_object(*in.field);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
   return text_of(out);
 }

@@ -17,8 +17,8 @@ namespace kiln {
 namespace {
 
 constexpr int kGrid = 48;          // samples a side, of the lobe and of the half space each
-constexpr double kGrazing = 2e-3;  // the least n.l, and the n.v of the horizon
-constexpr int kAzimuths = 64;      // along the horizon
+constexpr double kGrazing = 2e-3;  // the least n.l
+constexpr double kHorizon = 0.1;   // n.v below which radiance counts as that of the horizon
 constexpr double kPi = std::numbers::pi;
 
 struct Node {
@@ -37,10 +37,10 @@ Vec3d direction(double z, double azimuth) {
   return {r * std::cos(azimuth), r * std::sin(azimuth), z};
 }
 
-/// Equation 1 for functions over the half space of +z, given by their moments.
+/// Equation 1 for functions over the half space of +z that are even about the plane of azimuth 0, by their moments.
 class Fitter {
  public:
-  explicit Fitter(int degree) : order_(degree + 1) {
+  explicit Fitter(int degree) : order_(degree + 1), y_(sh_count(order_)) {
     const int n = sh_count(order_), azimuths = 2 * order_ + 2;
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
     Eigen::VectorXd y(n);
@@ -53,22 +53,25 @@ class Fitter {
       }
     }
     solver_.compute(gram);
+    below_ = zeros();
+    for (const Node& node : height_nodes(order_ + 1)) {
+      evaluate_sh(order_, direction(-node.z, 0), y.data());
+      below_ += node.weight * y;
+    }
   }
 
   int order() const { return order_; }
   Eigen::VectorXd zeros() const { return Eigen::VectorXd::Zero(sh_count(order_)); }
 
-  /// Adds what the prolongation of f(azimuth), the function at the horizon, brings to the moments.
-  template <class F>
-  void add_below(const F& at_horizon, Eigen::VectorXd& moments) const {
-    Eigen::VectorXd y(sh_count(order_));
-    std::array<double, kAzimuths> border;
-    for (int k = 0; k < kAzimuths; ++k) border[static_cast<std::size_t>(k)] = at_horizon(2 * kPi * k / kAzimuths);
-    for (const Node& node : height_nodes(order_ + 1)) {
-      for (int k = 0; k < kAzimuths; ++k) {
-        evaluate_sh(order_, direction(-node.z, 2 * kPi * k / kAzimuths), y.data());
-        moments += kBelow * node.weight * 2 * kPi / kAzimuths * border[static_cast<std::size_t>(k)] * y;
-      }
+  /// Adds to the moments what the function brings there that is `light` (times solid angle) at v: Y, and where v is
+  /// near the horizon what the other half space goes on with.
+  void add(const Vec3d& v, double light, Eigen::VectorXd& moments) {
+    evaluate_sh(order_, v, y_.data());
+    moments += light * y_;
+    if (v.z > kHorizon) return;
+    const double azimuth = std::atan2(v.y, v.x), share = kBelow * light / kHorizon;
+    for (int l = 0; l < order_; ++l) {
+      for (int m = 0; m <= l; ++m) moments[l * (l + 1) + m] += share * below_[l * (l + 1) + m] * std::cos(m * azimuth);
     }
   }
 
@@ -77,6 +80,8 @@ class Fitter {
  private:
   int order_;
   Eigen::LDLT<Eigen::MatrixXd> solver_;
+  Eigen::VectorXd below_;  // integrals of Y at azimuth 0 over the heights of the other half space
+  Eigen::VectorXd y_;
 };
 
 /// Reflected about the normal, (x, y) goes to (-x, -y): odd m change their sign. Those of m < 0 are 0.
@@ -96,16 +101,14 @@ Parts lobe_parts(double alpha, const Vec3d& v, const Vec3d& l) {
 }
 
 /// Moments of the lobe of light from l by directions drawn from it and even ones, joined by the balance heuristic.
-void fit_lobe(const Fitter& fitter, double alpha, const Vec3d& l, float* out) {
+void fit_lobe(Fitter fitter, double alpha, const Vec3d& l, float* out) {
   std::array<Eigen::VectorXd, 2> moments{fitter.zeros(), fitter.zeros()};
-  Eigen::VectorXd y = fitter.zeros();
   const auto add = [&](const Vec3d& v) {
-    if (v.z < kGrazing) return;
+    if (!(v.z > 0)) return;
     const Parts parts = lobe_parts(alpha, v, l);
-    const double density = ggx_density(alpha, l, v) + 0.5 / kPi;
-    evaluate_sh(fitter.order(), v, y.data());
-    moments[0] += parts.a / (density * kGrid * kGrid) * y;
-    moments[1] += parts.b / (density * kGrid * kGrid) * y;
+    const double solid = 1 / ((ggx_density(alpha, l, v) + 0.5 / kPi) * kGrid * kGrid);
+    fitter.add(v, parts.a * solid, moments[0]);
+    fitter.add(v, parts.b * solid, moments[1]);
   };
   for (int i = 0; i < kGrid; ++i) {
     for (int j = 0; j < kGrid; ++j) {
@@ -114,25 +117,18 @@ void fit_lobe(const Fitter& fitter, double alpha, const Vec3d& l, float* out) {
       add(direction(u.x, 2 * kPi * u.y));
     }
   }
-  const auto at_horizon = [&](double azimuth) { return lobe_parts(alpha, direction(kGrazing, azimuth), l); };
-  fitter.add_below([&](double azimuth) { return at_horizon(azimuth).a; }, moments[0]);
-  fitter.add_below([&](double azimuth) { return at_horizon(azimuth).b; }, moments[1]);
   const std::size_t count = LobeFit::count(fitter.order() - 1);
   for (std::size_t part = 0; part < 2; ++part)
     store_even(fitter.solve(moments[part]), fitter.order(), out + part * count);
 }
 
-std::vector<float> fit_diffuse(const Fitter& fitter, const LobeTable& lobes, double roughness) {
-  const auto left = [&](double z) { return 1 - lobe_at(lobes, z, roughness).kept(); };
-  Eigen::VectorXd moments = fitter.zeros(), y = fitter.zeros();
-  constexpr int kHeights = 64;
+std::vector<float> fit_diffuse(Fitter fitter, const LobeTable& lobes, double roughness) {
+  Eigen::VectorXd moments = fitter.zeros();
+  constexpr int kHeights = 64, kAzimuths = 2 * kMaxShOrder;
   for (const Node& node : height_nodes(kHeights)) {
-    // Only m = 0 has a moment: what is even about the normal.
-    evaluate_sh(fitter.order(), direction(node.z, 0), y.data());
-    for (int l = 0; l < fitter.order(); ++l)
-      moments[l * (l + 1)] += 2 * kPi * node.weight * left(node.z) * y[l * (l + 1)];
+    const double light = (1 - lobe_at(lobes, node.z, roughness).kept()) * node.weight * 2 * kPi / kAzimuths;
+    for (int k = 0; k < kAzimuths; ++k) fitter.add(direction(node.z, 2 * kPi * k / kAzimuths), light, moments);
   }
-  fitter.add_below([&](double) { return left(0); }, moments);
   const Eigen::VectorXd fit = fitter.solve(moments);
   std::vector<float> out;
   for (int l = 0; l < fitter.order(); ++l) out.push_back(static_cast<float>(fit[l * (l + 1)]));

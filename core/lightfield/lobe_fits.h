@@ -21,7 +21,7 @@
 namespace kiln {
 
 inline constexpr int kFitRows = 33, kFitColumns = 65;
-inline constexpr double kBelow = 0.001;
+inline constexpr double kBelow = 0.003;
 
 /// Of one roughness. Number k of (l, m), m = 0 .. l, is k = l (l + 1) / 2 + m.
 struct LobeFit {

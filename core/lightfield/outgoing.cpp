@@ -47,7 +47,7 @@ class Gather {
   Gather(const IncidentLight::World& world, const OutgoingBake& params)
       : seed_(mix64(params.seed ^ 0x6f7574676f696eULL)),
         sets_(0, 2 * half_of(params.rays), kSets, seed_, half_of(params.rays), Spread::half_sphere),
-        light_(world, {.count = sets_.samples(), .density = kEven, .direct = true}, seed_) {}
+        light_(world, {.count = sets_.samples(), .density = kEven, .direct = true, .blurred = true}, seed_) {}
 
   void add(const TransferPoint& point, Halves& into, std::uint64_t& rays) const {
     const Vec3f origin = ray_origin(point);

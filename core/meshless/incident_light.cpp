@@ -2,18 +2,70 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
+namespace {
+
+constexpr int kBrightSets = 64;
+
+}  // namespace
 
 IncidentLight::IncidentLight(const World& world, const Rays& own, std::uint64_t seed)
     : world_(world), own_(own), seed_(seed), emitters_(world.tracer.scene()) {
   if (!own.direct || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
   if (sampler.useful()) bright_ = std::move(sampler);
+  draw_bright_rays();
+  if (own.blurred && bright_) blurred_ = blurred_sky();
+}
+
+void IncidentLight::draw_bright_rays() {
+  if (!bright_) return;
+  const int half = (own_.count + 1) / 2;
+  for (int set = 0; set < kBrightSets; ++set) {
+    std::vector<std::pair<std::uint32_t, BrightRay>> rays;  // by half, and along a curve: packets are narrow
+    for (int k = 0; k < own_.count; ++k) {
+      const Vec2f u =
+          sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ 0x736b79ULL ^ static_cast<unsigned>(set)));
+      const Vec3d w = bright_->sample({u.x, u.y});
+      const double share = 1 / (own_.count * (own_.density + bright_->density(w)));
+      const Vec3f light = environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share);
+      rays.push_back({morton_code(u) >> 1 | (k < half ? 0U : 1U << 31), {to_float(w), light, place_of(k)}});
+    }
+    std::ranges::stable_sort(rays, {}, [](const auto& ray) { return ray.first; });
+    for (const auto& ray : rays) bright_rays_.push_back(ray.second);
+  }
+}
+
+/// The sky as rays see it, at a resolution of one texel for each.
+Environment IncidentLight::blurred_sky() const {
+  constexpr int kFinest = 512;
+  Environment out{.name = {}, .width = 0, .height = 0, .radiance = {}};
+  const double texels = 4 * std::numbers::pi * own_.density * own_.count;
+  out.height = std::clamp(static_cast<int>(std::lround(std::sqrt(texels / 2))), 4, kFinest);
+  out.width = 2 * out.height;
+  const int parts = std::max(2, kFinest / out.height);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      Vec3d sum;
+      double all = 0;
+      for (int i = 0; i < parts * parts; ++i) {
+        const double v = (y + (i / parts + 0.5) / parts) / out.height, u = (x + (i % parts + 0.5) / parts) / out.width;
+        const double up = std::numbers::pi * (0.5 - v), around = 2 * std::numbers::pi * (u - 0.5);
+        const Vec3d w{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)};
+        sum += to_double(balanced_sky(to_float(w))) * std::cos(up);
+        all += std::cos(up);
+      }
+      out.radiance.push_back(to_float(sum / all));
+    }
+  }
+  return out;
 }
 
 IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
@@ -32,10 +84,14 @@ void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::ui
   visit_emitters(place, item, rays, visit);
 }
 
-Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
-  if (world_.sky == nullptr) return {};
+Vec3f IncidentLight::balanced_sky(const Vec3f& w) const {
   const double balance = bright_ ? own_.density / (own_.density + bright_->density(to_double(w))) : 1;
   return environment_radiance(*world_.sky, w) * static_cast<float>(balance);
+}
+
+Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
+  if (world_.sky == nullptr) return {};
+  return blurred_ ? environment_radiance(*blurred_, w) : balanced_sky(w);
 }
 
 Vec3f IncidentLight::seen_emitter(const Hit& hit, const Vec3f& w) const {
@@ -61,14 +117,23 @@ void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, cons
 void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                      const Visit& visit) const {
   if (!bright_) return;
-  for (int k = 0; k < own_.count; ++k) {
-    const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x736b79ULL)));
-    const Vec3d w = bright_->sample({u.x, u.y});
-    if (world_.tracer.occluded(place, to_float(w), kFar)) continue;
-    const double share = 1 / (own_.count * (own_.density + bright_->density(w)));
-    visit(to_float(w), environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share), place_of(k));
+  const auto count = static_cast<std::size_t>(own_.count);
+  const BrightRay* set = &bright_rays_[count * (mix64(seed_ ^ mix64(item ^ 0x736b79ULL)) % kBrightSets)];
+  Rays16 packet;
+  packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z), packet.far.fill(kFar);
+  for (std::size_t first = 0; first < count; first += kPacket) {
+    const std::size_t n = std::min<std::size_t>(kPacket, count - first);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3f& w = set[first + i].w;
+      packet.dx[i] = w.x, packet.dy[i] = w.y, packet.dz[i] = w.z;
+    }
+    const std::uint32_t hidden = world_.tracer.occluded16(packet, static_cast<int>(n));
+    for (std::size_t i = 0; i < n; ++i) {
+      const BrightRay& ray = set[first + i];
+      if ((hidden >> i & 1U) == 0) visit(ray.w, ray.light, ray.place);
+    }
   }
-  rays += static_cast<std::uint64_t>(own_.count);
+  rays += count;
 }
 
 void IncidentLight::visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,

@@ -1,0 +1,142 @@
+#include "core/bake/light_field_step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/artifact/stored_transfer.h"
+#include "core/bake/radiosity_step.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+/// What the qualities spend.
+struct FieldEffort {
+  const char* reason;
+  int degree, rays;
+  std::uint64_t triangles;  // added where light, colour or finish change
+  double storage;           // relRMSE that storage may add
+};
+
+FieldEffort field_effort(Quality quality) {
+  switch (quality) {
+    case Quality::draft:
+      return {"the draft quality", 4, 256, 20'000, 0.02};
+    case Quality::standard:
+      return {"the standard quality", 6, 1024, 120'000, 0.01};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 8, 4096, 500'000, 0.005};
+}
+
+/// Adds the field to a prediction. Seconds a ray and bytes a number as measured on the damaged helmet.
+void add_prediction(Plan& plan) {
+  constexpr double kSecondsARay = 0.45e-6, kBytesANumber = 0.35;
+  const double vertices = static_cast<double>(plan.prediction.vertices),
+               rays = vertices * 2 * plan.field->outgoing.rays;
+  const int d = plan.field->outgoing.degree;
+  const double numbers = 3.0 * (d + 1) * (d + 1);
+  plan.prediction.rays += static_cast<std::uint64_t>(rays);
+  plan.prediction.seconds += 1 + kSecondsARay * rays;
+  plan.prediction.memory_bytes += static_cast<std::uint64_t>(vertices * numbers * 24);
+  plan.prediction.artifact_bytes += static_cast<std::uint64_t>(vertices * numbers * kBytesANumber);
+}
+
+TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
+  return {mesh.position[t[0]], mesh.normal[t[0]], mesh.position[t[0]], mesh.normal[t[0]]};
+}
+
+}  // namespace
+
+Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
+  const LightFieldStep& step = *recipe.light_field;
+  const FieldEffort effort = field_effort(recipe.quality);
+  RadiosityStep surface = step.surface;
+  if (!surface.subdivide.triangles) surface.subdivide.triangles = scene.mesh.triangles.size() + effort.triangles;
+  Plan plan = make_radiosity_plan(scene, surface, recipe.quality, sky, threads);
+  FieldPlan& f = plan.field.emplace();
+  f.outgoing.degree = step.degree.value_or(effort.degree);
+  f.outgoing.rays = step.rays.value_or(effort.rays);
+  f.outgoing.seed = recipe.seed;
+  f.storage = effort.storage;
+  const std::string asked = "asked for by the recipe";
+  if (!step.surface.subdivide.triangles) {
+    for (Decision& d : plan.decisions) {
+      if (d.decision == "subdivide" && plan.split)
+        d.reason = effort.reason + std::string(" adds triangles where direct light, colour or finish change");
+    }
+  }
+  decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
+  decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
+         (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
+  add_prediction(plan);
+  return plan;
+}
+
+FinishSource::FinishSource(const Scene& scene) : scene_(scene), nearest_(scene_.mesh) {
+  std::vector<TransferPoint> points;
+  for (const Triangle& t : scene_.mesh.triangles) points.push_back(first_corner(scene_.mesh, t));
+  scale_.fill(1);
+  Threads one(1);
+  const std::vector<float> plain = values(points, one);
+  for (std::size_t k = 0; k < kWidth; ++k) {
+    double sum = 0;
+    for (std::size_t i = k; i < plain.size(); i += kWidth) sum += double{plain[i]};
+    const double mean = sum * kWidth / static_cast<double>(std::max<std::size_t>(1, plain.size()));
+    // A colour that hardly occurs is no reason to split.
+    scale_[k] = static_cast<float>(1 / std::max(mean, 0.05));
+  }
+}
+
+std::vector<float> FinishSource::values(std::span<const TransferPoint> points, Threads& threads) const {
+  std::vector<float> out(points.size() * kWidth);
+  threads.for_blocks(points.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto match = nearest_.query(to_double(points[i].position), to_double(points[i].normal));
+      if (!match) continue;
+      const SurfacePoint p =
+          surface_point(scene_, match->triangle, static_cast<float>(match->u), static_cast<float>(match->v));
+      const Vec3f color = albedo_at(scene_, p);
+      const SurfaceFinish finish = finish_at(scene_, p);
+      const Vec3f glow = emission_at(scene_, p);
+      const std::array<float, kWidth> numbers{color.x, color.y, color.z,         glow.x,
+                                              glow.y,  glow.z,  finish.metallic, finish.roughness};
+      for (std::size_t k = 0; k < kWidth; ++k) out[i * kWidth + k] = numbers[k] * scale_[k];
+    }
+  });
+  return out;
+}
+
+OutgoingLight bake_light_field(const IncidentLight::World& world, std::span<const Vec3f> value, const Plan& plan,
+                               BakeLog& log, Threads& threads) {
+  OutgoingBake params = plan.field->outgoing;
+  params.progress = [&](std::uint64_t done, std::uint64_t all) { log.advance(done, all); };
+  OutgoingLight out = bake_outgoing(world, value, params, threads);
+  log.count_rays(out.rays);
+  return out;
+}
+
+TransferEncoding choose_field_encoding(const LightField& field, const Mesh& mesh, const Plan& plan) {
+  Transfer shape = field_shape(field.degree);
+  shape.coefficients = field.coefficients;
+  // The metric of components is made for light of mean 1.
+  double sum = 0;
+  for (std::size_t i = 0; i < shape.coefficients.size(); i += field.count()) sum += double{shape.coefficients[i]};
+  const double mean = std::abs(sum) / static_cast<double>(3 * field.vertices());
+  const auto scale = static_cast<float>(mean > 1e-30 ? 1 / mean : 1);
+  for (float& c : shape.coefficients) c *= scale;
+  // Each coefficient counts as the radiance that it adds, in the mean over all directions.
+  const std::vector<double> even(static_cast<std::size_t>(shape.order), 4 * std::numbers::pi);
+  const ComponentAnalysis analysis = analyse_components(shape, mesh, even);
+  const double share = plan.field->storage / std::sqrt(2.0);
+  const auto found = std::ranges::find_if(analysis.left_out, [&](double left) { return left <= share; });
+  const auto rank = std::max<std::size_t>(1, static_cast<std::size_t>(found - analysis.left_out.begin()));
+  TransferEncoding out{.components = analysis.first(rank), .weights = analysis.weights(shape, rank)};
+  for (float& c : out.components.rows) c /= scale;
+  out.weight_step = share * std::sqrt(12.0 / static_cast<double>(rank));
+  return out;
+}
+
+}  // namespace kiln
