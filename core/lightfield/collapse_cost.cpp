@@ -9,8 +9,9 @@
 namespace kiln {
 namespace {
 
-constexpr double kLengthUnit = 0.01;  // of the diagonal
-constexpr double kEvenness = 1e-9;    // of squared edge length beside Q: flat regions collapse short edges first
+// Of the diagonal. So that at the default weight neither light nor shape is paid for with the other: README.md.
+constexpr double kLengthUnit = 0.005;
+constexpr double kEvenness = 1e-9;  // of squared edge length beside Q: flat regions collapse short edges first
 
 double squared_diagonal(const std::vector<Vec3f>& position) {
   if (position.empty()) return 1;
@@ -76,9 +77,11 @@ void CollapseCost::update_point(std::uint32_t p) {
   });
   if (mesh_.kind(p) != PointKind::free) {
     for (const std::uint32_t x : neighbours) {
+      if (mesh_.kind(x) == PointKind::free) continue;
       const Vec3d other = mesh_.position(x);
-      if (mesh_.kind(x) != PointKind::free && mesh_.sides(p, x).crease)
-        q.add_line(other - at, cross(at, other), kBorderWeight);
+      const EdgeSides sides = mesh_.sides(p, x);
+      const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
+      if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
     }
   }
   quadric_[p] = q, area_[p] = area;
@@ -105,7 +108,8 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
   };
   const auto& position = mesh_.mesh().position;
   const Vec3d at = to_double(position[v]);
-  const std::size_t iw = index(w);
+  const bool partner = w != SurfacePoints::kNone;
+  const std::size_t iw = partner ? index(w) : 0;
   double sum = 0;
   mesh_.around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
     if (a == w || b == w) return;
@@ -113,7 +117,7 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
     const double area = 0.5 * length(cross(t[1] - t[0], t[2] - t[0]));
     const Vec3d weights = foot_barycentrics(t, at);
     const std::size_t i[] = {iw, index(a), index(b)};
-    const double x[] = {share * weights.x, weights.y, weights.z};
+    const double x[] = {partner ? share * weights.x : 0, weights.y, weights.z};
     double squared = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       squared += x[k] * x[k] * product(i[k], i[k]);
@@ -134,6 +138,12 @@ void CollapseCost::find_cost(CollapsePlan& plan) const {
       light += light_error(v, w, plan.share, place);
       if (plan.moves) light += light_error(w, v, 1 - plan.share, place);
     }
+    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+      if (!plan.sides.goes(v)) light += light_error(v, SurfacePoints::kNone, 0, place);
+    });
+    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+      if (plan.moves && !plan.sides.takes(w)) light += light_error(w, SurfacePoints::kNone, 0, place);
+    });
   }
   plan.cost = geometry_ * q.at(place) + light_ * light;
   plan.order = plan.cost + even_ * (area_[plan.gone] + area_[plan.kept]) * dot(edge, edge);
@@ -150,24 +160,19 @@ CollapsePlan CollapseCost::plan(std::uint32_t p, std::uint32_t q) const {
        {std::pair(std::max(p, q), std::min(p, q)), std::pair(std::min(p, q), std::max(p, q))}) {
     const EdgeSides sides = mesh_.sides(gone, kept);
     const auto allowed = mesh_.allowed(gone, kept, sides);
-    if (how_ == Collapse::edge && allowed.elsewhere) {
-      const Vec3d from = mesh_.position(gone), to = mesh_.position(kept), edge = to - from, middle = (from + to) * 0.5;
-      const Vec3d least = least_point(quadric_[gone] + quadric_[kept], middle);
-      if (!(dot(edge, edge) > 0) || length(least - middle) > 2 * length(edge)) {
-        consider({.gone = gone, .kept = kept, .place = to_float(to), .sides = sides});
-        continue;
-      }
-      const double share = std::clamp(dot(least - from, edge) / dot(edge, edge), 0.0, 1.0);
-      consider({.gone = gone,
-                .kept = kept,
-                .place = to_float(least),
-                .share = static_cast<float>(share),
-                .moves = true,
-                .sides = sides});
-      break;  // the other way round is the same
-    }
     if (allowed.at_kept)
       consider({.gone = gone, .kept = kept, .place = to_float(mesh_.position(kept)), .sides = sides});
+    if (how_ == Collapse::half_edge || !allowed.elsewhere || gone < kept) continue;  // the other way round is the same
+    const Vec3d from = mesh_.position(gone), edge = mesh_.position(kept) - from, middle = from + edge * 0.5;
+    const Vec3d least = least_point(quadric_[gone] + quadric_[kept], middle);
+    if (!(dot(edge, edge) > 0) || length(least - middle) > 2 * length(edge)) continue;
+    const double share = std::clamp(dot(least - from, edge) / dot(edge, edge), 0.0, 1.0);  // section 4.3
+    consider({.gone = gone,
+              .kept = kept,
+              .place = to_float(least),
+              .share = static_cast<float>(share),
+              .moves = true,
+              .sides = sides});
   }
   return best;
 }

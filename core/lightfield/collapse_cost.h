@@ -5,10 +5,12 @@
 //   cost = (geometry_weight Q / u^2 + (1 - geometry_weight) E / mean |L|^2) / area of the surface
 // L_t(p0) is extrapolated (4): weights of t's corners that sum to one. So d^2 is a quadratic form in those weights
 // whose matrix holds the products of the differences between p0's neighbours and p0 on p0's hemisphere. That Gram
-// matrix is kept for each vertex; a candidate then costs no integral at all, whatever the degree. Both are memoryless:
-// of the mesh as it is now. Paper    Vanhoey et al. 2015, section 4; Hoppe 1999 (memoryless quadrics) Units    cost is
-// a share of a squared relative error; u is kLengthUnit of the diagonal of the mesh's box Differs  the paper leaves the
-// scale of light and length to the user; here it is the field's mean square and u
+// matrix is kept for each vertex; a candidate then costs no integral at all, whatever the degree.
+// Both are memoryless: of the mesh as it is now.
+// Paper    Vanhoey et al. 2015, section 4; Hoppe 1999 (memoryless quadrics)
+// Units    cost is a share of a squared relative error; u is kLengthUnit of the diagonal of the mesh's box
+// Differs  the paper leaves the scales of light and length to the user: here they are the field's mean square and u.
+//          Its edge collapse takes the optimal place; here the two ends may be cheaper
 
 #include <cstdint>
 #include <vector>
@@ -49,6 +51,8 @@ class CollapseCost {
     std::vector<float> product;       // of neighbours i >= k: i (i + 1) / 2 + k
   };
   void find_cost(CollapsePlan&) const;
+  /// Of the triangles around v, when v at `place` has the light (1 - share) v + share w. w may be kNone: then that of
+  /// v.
   double light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
 
   const CollapseMesh& mesh_;

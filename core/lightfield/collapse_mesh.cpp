@@ -62,7 +62,7 @@ PointKind CollapseMesh::find_kind(std::uint32_t p, bool locked) {
   if (borders == 0 && seams == 0 && vertices == 1) return PointKind::free;
   if (borders == 2 && seams == 0 && vertices == 1) return PointKind::border;
   if (borders == 0 && seams == 2 && vertices == 2) return PointKind::seam;
-  return PointKind::locked;
+  return PointKind::junction;
 }
 
 const std::vector<std::uint32_t>& CollapseMesh::ring(std::uint32_t p) {
@@ -100,9 +100,9 @@ EdgeSides CollapseMesh::sides(std::uint32_t p, std::uint32_t q) const {
 CollapseMesh::Allowed CollapseMesh::allowed(std::uint32_t gone, std::uint32_t kept, const EdgeSides& s) const {
   if (s.triangles == 0 || s.triangles > 2 || kind_[gone] == PointKind::locked) return {};
   if (kind_[gone] == PointKind::free) return {.at_kept = true, .elsewhere = kind_[kept] == PointKind::free};
-  // Along its own crease, each side onto a side of its own.
+  // Along a crease of its own, each vertex onto one.
   const bool split = s.pairs == 2 && s.from[0] == s.from[1];
-  if (!s.crease || split || (kind_[gone] == PointKind::seam) != (s.pairs == 2)) return {};
+  if (!s.crease || split) return {};
   return {.at_kept = true, .elsewhere = kind_[kept] == kind_[gone] && !(s.pairs == 2 && s.to[0] == s.to[1])};
 }
 
@@ -137,7 +137,7 @@ bool CollapseMesh::keeps_topology(std::uint32_t p, std::uint32_t q, const EdgeSi
   }
   if (!s.crease) return true;
   return std::ranges::none_of(common_, [&](std::uint32_t x) {
-    return kind_[x] != PointKind::free && sides(p, x).crease && sides(q, x).crease;
+    return kind_[x] != PointKind::free && kind_[x] != PointKind::junction && sides(p, x).crease && sides(q, x).crease;
   });
 }
 
@@ -159,13 +159,37 @@ bool CollapseMesh::spoils(std::uint32_t p, std::uint32_t q, const Vec3d& place) 
   return bad;
 }
 
-const std::vector<std::uint32_t>& CollapseMesh::join(std::uint32_t gone, const EdgeSides& s) {
+/// Vertices of `gone` without a partner become vertices of `kept`.
+void CollapseMesh::carry_rest(std::uint32_t gone, std::uint32_t kept, const EdgeSides& s) {
+  std::uint32_t last = first_vertex_[kept];
+  while (next_vertex_[last] != kNone) last = next_vertex_[last];
+  for (std::uint32_t v = first_vertex_[gone], next = kNone; v != kNone; v = next) {
+    next = next_vertex_[v];
+    next_vertex_[v] = kNone;
+    if (s.goes(v)) continue;
+    point_[v] = kept;
+    last = next_vertex_[last] = v;
+  }
+  first_vertex_[gone] = kNone;
+  if (kind_[gone] == PointKind::junction && kind_[kept] != PointKind::locked) kind_[kept] = PointKind::junction;
+}
+
+void CollapseMesh::drop_orphan(std::uint32_t v) {
+  if (head_[v] != kNone || std::ranges::find(joined_.orphans, v) != joined_.orphans.end()) return;
+  joined_.orphans.push_back(v);
+  std::uint32_t* link = &first_vertex_[point_[v]];
+  while (*link != v) link = &next_vertex_[*link];
+  *link = next_vertex_[v];
+  next_vertex_[v] = kNone;
+}
+
+const CollapseMesh::Joined& CollapseMesh::join(std::uint32_t gone, std::uint32_t kept, const EdgeSides& s) {
   for (std::uint32_t i = 0; i < s.triangles; ++i) gone_[s.triangle[i]] = true, --left_;
   std::array<std::uint32_t, 2> others{};  // across from the edge
   for (std::uint32_t i = 0; i < s.triangles; ++i)
     for (const std::uint32_t v : lit_.mesh.triangles[s.triangle[i]])
       if (v != s.from[i] && v != s.to[i]) others[i] = v;
-  turned_.clear();
+  joined_.turned.clear(), joined_.orphans.clear();
   for (std::uint32_t i = 0; i < s.pairs; ++i) {
     const std::uint32_t v = s.from[i], w = s.to[i];
     std::uint32_t corner = head_[v];
@@ -175,15 +199,16 @@ const std::vector<std::uint32_t>& CollapseMesh::join(std::uint32_t gone, const E
       if (!gone_[corner / 3]) {
         lit_.mesh.triangles[corner / 3][corner % 3] = w;
         append(w, corner);
-        turned_.push_back(2 * (corner / 3) + i);
+        joined_.turned.push_back(2 * (corner / 3) + i);
       }
       corner = following;
     }
     drop_gone(w);
   }
   for (std::uint32_t i = 0; i < s.triangles; ++i) drop_gone(others[i]), drop_gone(s.to[i]);
-  first_vertex_[gone] = kNone;
-  return turned_;
+  carry_rest(gone, kept, s);
+  for (std::uint32_t i = 0; i < s.triangles; ++i) drop_orphan(others[i]), drop_orphan(s.to[i]);
+  return joined_;
 }
 
 }  // namespace kiln

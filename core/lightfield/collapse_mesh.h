@@ -3,9 +3,11 @@
 // do.
 //
 // A crease is an edge with one triangle (border) or whose two triangles do not share both vertices (seam). A point
-// without creases is free; one in the middle of a border or of a seam moves along it only; where creases end, meet or
-// cannot be told apart, the point is locked and stays where it is. What a point is never changes, because a collapse
-// may not join two creases. Repeat  same bits always
+// without creases is free; one in the middle of a border or of a seam moves along it only. Where creases end, meet or
+// cannot be told apart it is a junction: it moves along any of its creases, and its vertices that have no partner on
+// the edge go along as they are. Flat shading makes a junction of every point. What find_surface_points locks stays.
+//
+// Repeat  same bits always
 
 #include <array>
 #include <cstdint>
@@ -16,7 +18,7 @@
 
 namespace kiln {
 
-enum class PointKind : std::uint8_t { free, border, seam, locked };
+enum class PointKind : std::uint8_t { free, border, seam, junction, locked };
 
 /// The triangles on an edge between points p and q, and which vertices of p and q they join: at most two of each.
 struct EdgeSides {
@@ -24,6 +26,8 @@ struct EdgeSides {
   std::array<std::uint32_t, 2> triangle{}, from{}, to{};
   std::uint32_t pairs = 0;  // different ones among (from, to), which stand first
   bool crease = false;
+  bool goes(std::uint32_t v) const { return (pairs > 0 && from[0] == v) || (pairs > 1 && from[1] == v); }
+  bool takes(std::uint32_t w) const { return (pairs > 0 && to[0] == w) || (pairs > 1 && to[1] == w); }
 };
 
 class CollapseMesh {
@@ -71,20 +75,27 @@ class CollapseMesh {
   };
   Allowed allowed(std::uint32_t gone, std::uint32_t kept, const EdgeSides& sides) const;
 
-  /// Link condition: the surface stays a manifold of the same shape, no piece of it vanishes, no creases join.
+  /// Link condition: the surface stays a manifold of the same shape, no piece of it vanishes, and of three creases
+  /// around a triangle no two become one where a border or seam goes on.
   bool keeps_topology(std::uint32_t p, std::uint32_t q, const EdgeSides& sides);
   /// Whether a triangle around p without q would turn over, lose its area, become a needle or turn away from its
   /// vertices' normals, with p at `place`.
   bool spoils(std::uint32_t p, std::uint32_t q, const Vec3d& place) const;
 
-  /// Vertices from[i] of `gone` become to[i]; the triangles between vanish. Returns the triangles whose corner moved
-  /// from a vertex to another, valid until the next call.
-  const std::vector<std::uint32_t>& join(std::uint32_t gone, const EdgeSides& sides);
+  /// Vertices from[i] of `gone` become to[i] of `kept`, the others become vertices of `kept`; the triangles between
+  /// vanish. The result is valid until the next call.
+  struct Joined {
+    std::vector<std::uint32_t> turned;   // 2 t + i for each triangle t whose corner went from from[i] to to[i]
+    std::vector<std::uint32_t> orphans;  // vertices that have lost their last triangle and are no more
+  };
+  const Joined& join(std::uint32_t gone, std::uint32_t kept, const EdgeSides& sides);
 
  private:
   static constexpr std::uint32_t kNone = SurfacePoints::kNone;
   void append(std::uint32_t v, std::uint32_t corner);
   void drop_gone(std::uint32_t v);
+  void carry_rest(std::uint32_t gone, std::uint32_t kept, const EdgeSides& sides);
+  void drop_orphan(std::uint32_t v);
   PointKind find_kind(std::uint32_t p, bool locked);
   bool next_to(std::uint32_t p, std::uint32_t q) const;
 
@@ -94,7 +105,8 @@ class CollapseMesh {
   std::vector<PointKind> kind_;
   std::vector<bool> gone_;
   std::size_t left_ = 0;
-  std::vector<std::uint32_t> mark_, ring_, common_, turned_;
+  std::vector<std::uint32_t> mark_, ring_, common_;
+  Joined joined_;
   std::uint32_t stamp_ = 0;
 };
 

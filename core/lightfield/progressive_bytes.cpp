@@ -23,12 +23,12 @@ struct Header {
                 splits = 0, turned = 0, moved = 0;
 };
 
-/// Of a split, as stored: counts are vertices | triangles << 2 | moves << 4 | turned << 8.
+/// Of a split, as stored: counts are vertices | triangles << 3 | pairs << 5 | moved << 7.
 struct StoredSplit {
-  std::uint32_t counts = 0, parent[2] = {};
+  std::uint32_t counts = 0, turned = 0, parent[2] = {};
   float error = 0;
 };
-constexpr std::uint32_t kMostTurned = 0xffffff;
+constexpr std::uint32_t kMostMoved = 0x1ffffff, kMostVertices = 6;
 
 std::uint32_t attributes_of(const Mesh& m) {
   return (m.uv0.empty() ? 0 : kHasUv0) | (m.uv1.empty() ? 0 : kHasUv1) | (m.color.empty() ? 0 : kHasColor) |
@@ -52,6 +52,7 @@ void each_array(Progressive& p, Splits& splits, const Header& h, const Visit& vi
   if (h.has & kHasPart) visit(p.all.mesh.part, h.triangles);
   visit(splits, h.splits);
   visit(p.turned, h.turned);
+  visit(p.moved_vertex, h.moved);
   vertices_of(p.moved, h.moved);
 }
 
@@ -89,25 +90,29 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
   for (std::size_t s = 0; s < p.splits.size(); ++s) {
     const VertexSplit& split = p.splits[s];
     const std::string where = "split " + std::to_string(s);
-    if (split.vertices < 1 || split.vertices > 2 || split.triangles < 1 || split.triangles > 2)
-      return fault("slot_count_mismatch", "A split brings one or two vertices and triangles.", where);
+    if (split.pairs < 1 || split.pairs > 2 || split.vertices < split.pairs || split.vertices > kMostVertices ||
+        split.triangles < 1 || split.triangles > 2)
+      return fault("slot_count_mismatch", "A split brings too few or too many vertices or triangles.", where);
     if (!(split.error >= 0 && split.error <= error))
       return fault("number_out_of_range", "An error is not a number that falls from level to level.", where);
     error = split.error;
-    for (std::uint32_t i = 0; i < split.vertices; ++i)
-      if (split.parent[i] >= vertices) return bad_index("A parent is not there yet.", where);
-    if (turned + split.turned > p.turned.size() || vertices + split.vertices > p.all.mesh.position.size() ||
-        triangles + split.triangles > corners.size())
-      return fault("slot_count_mismatch", "There are fewer vertices, triangles or turned corners than splits need.",
-                   where);
+    for (std::uint32_t i = 0; i < split.pairs; ++i)
+      if (split.parent[i] >= vertices + split.vertices) return bad_index("A parent is not there yet.", where);
+    if (turned + split.turned > p.turned.size() || rows + split.moved > p.moved_vertex.size() ||
+        vertices + split.vertices > p.all.mesh.position.size() || triangles + split.triangles > corners.size())
+      return fault("slot_count_mismatch",
+                   "There are fewer vertices, triangles, corners or moved vertices than splits need.", where);
+    for (std::uint32_t k = 0; k < split.moved; ++k, ++rows)
+      if (p.moved_vertex[rows] >= vertices + split.vertices)
+        return bad_index("A moved vertex is not there yet.", where);
     for (std::uint32_t k = 0; k < split.turned; ++k, ++turned) {
       const std::uint32_t triangle = p.turned[turned] / 2, i = p.turned[turned] % 2;
-      if (i >= split.vertices || triangle >= triangles) return bad_index("A turned corner is not there.", where);
+      if (i >= split.pairs || triangle >= triangles) return bad_index("A turned corner is not there.", where);
       const auto corner = std::ranges::find(corners[triangle], split.parent[i]);
       if (corner == corners[triangle].end()) return bad_index("A turned triangle has no corner at the parent.", where);
       *corner = static_cast<std::uint32_t>(vertices) + i;
     }
-    rows += split.moves ? split.vertices : 0;
+
     const std::uint64_t begin = triangles;
     vertices += split.vertices, triangles += split.triangles;
     KILN_TRY(fine, check_triangles(begin, where));
@@ -137,10 +142,9 @@ std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
   std::vector<StoredSplit> splits;
   splits.reserve(p.splits.size());
   for (const VertexSplit& s : p.splits) {
-    EXPECTS(s.turned <= kMostTurned);
-    splits.push_back({s.vertices | s.triangles << 2 | (s.moves ? 1U : 0U) << 4 | s.turned << 8,
-                      {s.parent[0], s.parent[1]},
-                      s.error});
+    EXPECTS(s.moved <= kMostMoved);
+    splits.push_back(
+        {s.vertices | s.triangles << 3 | s.pairs << 5 | s.moved << 7, s.turned, {s.parent[0], s.parent[1]}, s.error});
   }
   std::vector<std::uint8_t> out;
   const auto put = [&](const void* data, std::size_t bytes) {
@@ -180,11 +184,12 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
     at += count * sizeof array[0];
   });
   for (const StoredSplit& s : splits)
-    p.splits.push_back({.vertices = s.counts & 3,
-                        .triangles = s.counts >> 2 & 3,
+    p.splits.push_back({.vertices = s.counts & 7,
+                        .triangles = s.counts >> 3 & 3,
+                        .pairs = s.counts >> 5 & 3,
                         .parent = {s.parent[0], s.parent[1]},
-                        .moves = (s.counts >> 4 & 1) != 0,
-                        .turned = s.counts >> 8,
+                        .moved = s.counts >> 7,
+                        .turned = s.turned,
                         .error = s.error});
   if (!all_finite(p.all)) return fault("number_out_of_range", "A vertex has a number that is not finite.", "vertices");
   if (!all_finite(p.moved)) return fault("number_out_of_range", "A row has a number that is not finite.", "moved rows");

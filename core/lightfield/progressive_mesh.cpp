@@ -32,6 +32,8 @@ Order order_of(const CollapseRecord& record) {
   for (std::size_t s = record.steps.size(); s-- > 0;) {
     const CollapseStep& step = record.steps[s];
     for (std::size_t i = 0; i < step.pairs; ++i) out.vertices.push_back(step.gone[i]);
+    for (std::size_t i = s == 0 ? 0 : record.steps[s - 1].orphans; i < step.orphans; ++i)
+      out.vertices.push_back(record.orphans[i]);
     for (std::size_t i = s == 0 ? 0 : record.steps[s - 1].removed; i < step.removed; ++i)
       out.triangles.push_back(record.removed[i]);
   }
@@ -62,25 +64,21 @@ ProgressiveMesh progressive_mesh(const CollapseRecord& record) {
     out.all.mesh.triangles.push_back({order.vertex[a], order.vertex[b], order.vertex[c]});
     if (!record.all.mesh.part.empty()) out.all.mesh.part.push_back(record.all.mesh.part[t]);
   }
-  std::vector<std::size_t> first_row(record.steps.size());  // of a step in record.before
-  std::size_t rows = 0;
-  for (std::size_t s = 0; s < record.steps.size(); ++s) {
-    first_row[s] = rows;
-    if (record.steps[s].moved) rows += record.steps[s].pairs;
-  }
   auto vertices = static_cast<std::uint32_t>(order.vertices.size());
   auto triangles = static_cast<std::uint32_t>(order.triangles.size());
   for (std::size_t s = record.steps.size(); s-- > 0;) {
     const CollapseStep& step = record.steps[s];
     const CollapseStep before = s == 0 ? CollapseStep{} : record.steps[s - 1];
-    VertexSplit split{.vertices = step.pairs,
+    VertexSplit split{.vertices = step.pairs + static_cast<std::uint32_t>(step.orphans - before.orphans),
                       .triangles = static_cast<std::uint32_t>(step.removed - before.removed),
-                      .moves = step.moved,
+                      .pairs = step.pairs,
+                      .moved = static_cast<std::uint32_t>(step.moved - before.moved),
                       .turned = static_cast<std::uint32_t>(step.turned - before.turned),
                       .error = step.error};
-    for (std::uint32_t i = 0; i < step.pairs; ++i) {
-      split.parent[i] = order.vertex[step.kept[i]];
-      if (step.moved) append_vertex(out.moved, record.before, static_cast<std::uint32_t>(first_row[s] + i));
+    for (std::uint32_t i = 0; i < step.pairs; ++i) split.parent[i] = order.vertex[step.kept[i]];
+    for (std::size_t i = before.moved; i < step.moved; ++i) {
+      out.moved_vertex.push_back(order.vertex[record.moved[i]]);
+      append_vertex(out.moved, record.before, static_cast<std::uint32_t>(i));
     }
     for (std::size_t i = before.turned; i < step.turned; ++i)
       out.turned.push_back(2 * order.triangle[record.turned[i] / 2] + record.turned[i] % 2);
@@ -98,7 +96,7 @@ LitMesh at_level(const ProgressiveMesh& p, std::size_t splits) {
   LitMesh out = p.all;
   for (std::size_t s = 0; s < splits; ++s) {
     const VertexSplit& split = p.splits[s];
-    for (std::uint32_t i = 0; split.moves && i < split.vertices; ++i) set_vertex(out, split.parent[i], p.moved, row++);
+    for (std::uint32_t i = 0; i < split.moved; ++i, ++row) set_vertex(out, p.moved_vertex[row], p.moved, row);
     for (std::uint32_t k = 0; k < split.turned; ++k, ++turned) {
       const std::uint32_t i = p.turned[turned] % 2;
       std::ranges::replace(out.mesh.triangles[p.turned[turned] / 2], split.parent[i], vertices + i);

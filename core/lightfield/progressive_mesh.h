@@ -1,9 +1,11 @@
 #pragma once
 // A lit mesh at every level of detail: a base, and vertex splits that bring back what simplify() took away.
 //
-// A split brings one or two vertices (two on a seam) and one or two triangles. Corners of some triangles move from the
-// vertex it splits off to the new one, and where the collapse had moved that vertex, its old attributes return. All of
-// it is stored as it was and nothing is added up, so that every level has the same bits in any language.
+// A split brings one or two triangles, and vertices: one that splits off another (two on a seam), and such as only
+// those triangles have. Corners of some triangles turn from the vertex that was split to the new one, and vertices that
+// the collapse had moved get their old attributes back. All of it is stored as it was and nothing is added up, so that
+// every level has the same bits in any language.
+//
 // Paper    Hoppe 1996, with the light of Vanhoey et al. 2015, 4.5
 // Error    of a level: SimplifyResult::error when it was reached; never rises from one level to the next
 
@@ -18,11 +20,11 @@
 namespace kiln {
 
 struct VertexSplit {
-  std::uint32_t vertices = 1;             // new ones: numbers follow on those there are
+  std::uint32_t vertices = 1;             // new ones, at most 6: numbers follow on those there are
   std::uint32_t triangles = 1;            // the same
-  std::array<std::uint32_t, 2> parent{};  // new vertex i splits off parent[i]
-  bool moves = false;                     // parents get the attributes of the next rows of ProgressiveMesh::moved
-  std::uint32_t turned = 0;               // of the next elements of ProgressiveMesh::turned
+  std::uint32_t pairs = 1;                // the first one or two of them split off others (or new ones):
+  std::array<std::uint32_t, 2> parent{};  // new vertex i off parent[i]
+  std::uint32_t moved = 0, turned = 0;    // so many of the next elements of ProgressiveMesh's arrays
   float error = 0;                        // of the level before this split
 };
 
@@ -30,8 +32,9 @@ struct ProgressiveMesh {
   std::uint32_t base_vertices = 0, base_triangles = 0;
   LitMesh all;  // vertices and triangles of the base, then of each split in turn; each as it is when it comes
   std::vector<VertexSplit> splits;
-  std::vector<std::uint32_t> turned;  // 2 triangle + i: its corner at parent[i] moves to new vertex i
-  LitMesh moved;                      // vertices only
+  std::vector<std::uint32_t> turned;        // 2 triangle + i: its corner at parent[i] becomes new vertex i
+  std::vector<std::uint32_t> moved_vertex;  // there before or new: gets the attributes
+  LitMesh moved;                            // of this one, which has vertices only
 
   std::size_t levels() const { return splits.size() + 1; }  // level k has k splits
 };

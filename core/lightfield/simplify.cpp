@@ -9,6 +9,10 @@
 namespace kiln {
 namespace {
 
+/// A cost counts the change at one point for all of the triangles around it. There it falls to nothing at their other
+/// corners: the mean square of such a hat over a triangle is a sixth of its height's.
+double relative_error(double summed_cost) { return std::sqrt(summed_cost / 6); }
+
 class Simplifier {
  public:
   Simplifier(LitMesh lit, const Simplify& params, Threads& threads)
@@ -30,9 +34,9 @@ class Simplifier {
       if (age_[c.a] + age_[c.b] != c.age) continue;
       const CollapsePlan plan = cost_.plan(c.a, c.b);
       if (!may_join(plan)) continue;  // it comes again when something around it changes
-      if (std::sqrt(squared_error_ + plan.cost) > params_.max_error) break;
+      if (relative_error(summed_cost_ + plan.cost) > params_.max_error) break;
       join(plan);
-      if (queue_.size() > 6 * mesh_.triangles_left() + 1024) drop_stale();
+      if (queue_.size() > 3 * mesh_.triangles_left() + 1024) drop_stale();  // half of it is alive
     }
     return finish();
   }
@@ -80,16 +84,20 @@ class Simplifier {
   }
 
   void join(const CollapsePlan& plan) {
-    squared_error_ += plan.cost;
+    summed_cost_ += plan.cost;
+    moving_.clear();
+    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+      if (!plan.sides.goes(v)) moving_.push_back(v);
+    });
+    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+      if (plan.moves) moving_.push_back(w);
+    });
     if (params_.record) note_before(plan);
-    if (plan.moves) {
-      for (std::uint32_t i = 0; i < plan.sides.pairs; ++i) {
-        draw_towards(lit_, plan.sides.to[i], plan.sides.from[i], plan.share);
-        lit_.mesh.position[plan.sides.to[i]] = plan.place;
-      }
-    }
-    const auto& turned = mesh_.join(plan.gone, plan.sides);
-    if (params_.record) note_after(plan, turned);
+    for (std::uint32_t i = 0; plan.moves && i < plan.sides.pairs; ++i)
+      draw_towards(lit_, plan.sides.to[i], plan.sides.from[i], plan.share);
+    for (const std::uint32_t v : moving_) lit_.mesh.position[v] = plan.place;
+    const CollapseMesh::Joined& joined = mesh_.join(plan.gone, plan.kept, plan.sides);
+    if (params_.record) note_after(plan, joined);
     renew(plan);
   }
 
@@ -113,23 +121,26 @@ class Simplifier {
 
   void note_before(const CollapsePlan& plan) {
     CollapseRecord& r = out_.record;
-    for (std::uint32_t i = 0; plan.moves && i < plan.sides.pairs; ++i) append_vertex(r.before, lit_, plan.sides.to[i]);
+    for (const std::uint32_t v : moving_) append_vertex(r.before, lit_, v);
+    r.moved.insert(r.moved.end(), moving_.begin(), moving_.end());
     for (std::uint32_t i = 0; i < plan.sides.triangles; ++i) r.removed.push_back(plan.sides.triangle[i]);
   }
-  void note_after(const CollapsePlan& plan, const std::vector<std::uint32_t>& turned) {
+  void note_after(const CollapsePlan& plan, const CollapseMesh::Joined& joined) {
     CollapseRecord& r = out_.record;
-    r.turned.insert(r.turned.end(), turned.begin(), turned.end());
+    r.turned.insert(r.turned.end(), joined.turned.begin(), joined.turned.end());
+    r.orphans.insert(r.orphans.end(), joined.orphans.begin(), joined.orphans.end());
     r.steps.push_back({.pairs = plan.sides.pairs,
                        .gone = plan.sides.from,
                        .kept = plan.sides.to,
-                       .moved = plan.moves,
+                       .orphans = r.orphans.size(),
+                       .moved = r.moved.size(),
                        .removed = r.removed.size(),
                        .turned = r.turned.size(),
-                       .error = static_cast<float>(std::sqrt(squared_error_))});
+                       .error = static_cast<float>(relative_error(summed_cost_))});
   }
 
   SimplifyResult finish() {
-    out_.error = std::sqrt(squared_error_);
+    out_.error = relative_error(summed_cost_);
     out_.reached = mesh_.triangles_left() <= params_.triangles;
     if (params_.record) out_.record.all = lit_;
     std::size_t kept = 0;
@@ -154,8 +165,8 @@ class Simplifier {
   CollapseCost cost_;
   std::vector<std::uint32_t> age_;  // of a point: how often its candidates were renewed
   CollapseQueue queue_;
-  double squared_error_ = 0;
-  std::vector<std::uint32_t> changed_;
+  double summed_cost_ = 0;
+  std::vector<std::uint32_t> changed_, moving_;  // points and vertices of the collapse at hand
   SimplifyResult out_;
 };
 

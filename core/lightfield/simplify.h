@@ -2,9 +2,9 @@
 // Simplification that sees light: edges collapse in the order of what they change of the radiance towards every eye.
 //
 // The collapse that costs least (collapse_cost.h) goes first. It is refused where it would change the topology, turn a
-// triangle over, pull a border or seam off its line, or let creases join; so a target may be out of reach, and the
-// result says how far it came. The new vertex lies where the quadrics are least; its normal, light and other attributes
-// are those of the nearest place on the edge. Vertices at one position move together (surface_points.h).
+// triangle over, or let creases join; so a target may be out of reach, and the result says how far it came. The new
+// vertex lies where the quadrics are least or at either end; its normal, light and other attributes are those of the
+// nearest place on the edge. Vertices at one position move together (surface_points.h, collapse_mesh.h).
 // Paper    Vanhoey et al. 2015, section 4.   Units  of Mesh and LightField
 // Cost     n log n; README.md has times and memory
 // Repeat   same bits for any number of threads: they only prepare the first costs
@@ -28,26 +28,27 @@ struct Simplify {
   bool record = false;  // of every collapse, for progressive_mesh()
 };
 
-/// What a collapse took away. Indices are of SimplifyResult::all.
+/// What a collapse took away. Indices are of CollapseRecord::all.
 struct CollapseStep {
   std::uint32_t pairs = 1;  // vertices gone[i] went into kept[i]
   std::array<std::uint32_t, 2> gone{}, kept{};
-  bool moved = false;                   // kept had other attributes before: the next rows of CollapseRecord::before
-  std::size_t removed = 0, turned = 0;  // ends of this step in CollapseRecord::removed and ::turned
-  float error = 0;                      // SimplifyResult::error once this step was done
+  std::size_t orphans = 0, moved = 0, removed = 0, turned = 0;  // ends of this step in the arrays of CollapseRecord
+  float error = 0;                                              // SimplifyResult::error once this step was done
 };
 
 struct CollapseRecord {
   std::vector<CollapseStep> steps;
+  std::vector<std::uint32_t> orphans;  // vertices without a triangle left
+  std::vector<std::uint32_t> moved;    // vertices that got other attributes,
+  LitMesh before;                      // and what they were: a vertex for each element of `moved`
   std::vector<std::uint32_t> removed;  // triangles, which keep the corners they had
   std::vector<std::uint32_t> turned;   // 2 triangle + i: its corner went from gone[i] to kept[i]
-  LitMesh before;                      // vertices: of kept, step by step and pair by pair
   LitMesh all;                         // every vertex, and triangle, as it was last
 };
 
 struct SimplifyResult {
   LitMesh lit;
-  double error = 0;      // sqrt of the summed costs: an estimate of the relative RMS error, see README.md
+  double error = 0;      // an estimate, from the costs, of the relative RMS error of light and shape: README.md
   bool reached = false;  // the asked number of triangles
   CollapseRecord record;
 };

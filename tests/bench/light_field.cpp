@@ -1,14 +1,11 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
-//   kiln_light_field distance                            closed form against product Gauss quadrature
-//   kiln_light_field colours MODEL                      plain vertex colours, against meshoptimizer's WASM build
-//   kiln_light_field scale [VERTICES] [DEGREE] [RATIO]   time and memory of one simplification
+//   kiln_light_field all MODELS                          the tables of core/lightfield/README.md; MODELS is
+//   shared/models kiln_light_field scale VERTICES [DEGREE] [RATIO]     time and memory of one simplification
 #include <sys/resource.h>
 
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <fstream>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -19,6 +16,7 @@
 #include "core/sphere/quadrature.h"
 #include "core/sphere/sampling.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/light_field_compare.h"
 #include "tests/bench/light_field_models.h"
 
 namespace kiln::bench {
@@ -123,6 +121,33 @@ Paint veins(const Vec3f& p) {
           .gloss = 0.1F + 0.5F * noise(p, 0.2F)};
 }
 
+/// What one candidate collapse costs, and the Gram matrix that a vertex keeps for its candidates.
+void measure_candidate(int degree) {
+  Mesh mesh = relief_torus(100);
+  LitMesh lit{.mesh = mesh, .field = paint_light(mesh, degree, 0.02, veins)};
+  const SurfacePoints points = find_surface_points(lit);
+  CollapseMesh connected(lit, points);
+  CollapseCost cost(connected, 0.01, Collapse::edge);
+  const auto vertices = static_cast<std::uint32_t>(lit.mesh.position.size());
+  for (std::uint32_t p = 0; p < connected.points(); ++p) cost.update_point(p);
+  const double gram = nanoseconds(1,
+                                  [&](int) {
+                                    for (std::uint32_t v = 0; v < vertices; ++v) cost.update_vertex(v);
+                                  }) /
+                      vertices;
+  volatile double sink = 0;
+  const auto& triangles = lit.mesh.triangles;
+  const double plan = nanoseconds(1,
+                                  [&](int) {
+                                    for (const Triangle& t : triangles)
+                                      sink = cost.plan(connected.point(t[0]), connected.point(t[1])).cost;
+                                  }) /
+                      static_cast<double>(triangles.size());
+  std::printf(R"({"bench":"candidate","degree":%d,"candidate_ns":%.0f,"vertex_ns":%.0f})"
+              "\n",
+              degree, plan, gram);
+}
+
 /// Time and memory of one simplification to a share of the triangles.
 void measure_scale(std::uint32_t vertices, int degree, double ratio) {
   Mesh mesh = relief_torus(static_cast<std::uint32_t>(std::lround(std::sqrt(vertices / 2.0))));
@@ -141,48 +166,27 @@ void measure_scale(std::uint32_t vertices, int degree, double ratio) {
               peak_megabytes(), out.error);
 }
 
-void tell(const char* bench, const char* by, const LitMesh& truth, const LitMesh& found, double seconds,
-          Threads& threads) {
-  const LightFieldError e = compare(truth, found, threads);
-  std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%zu,"seconds":%.2f,)"
-              R"("light_error":%.4f,"distance_percent":%.4f})"
+double bytes_of(const LitMesh& lit) {
+  return static_cast<double>(lit.mesh.position.size() * (24 + 12 * lit.field.count()) + 12 * lit.mesh.triangles.size());
+}
+
+/// `estimate`: SimplifyResult::error, of ours.
+void tell(const char* bench, const std::string& by, const LitMesh& truth, const LitMesh& found, double seconds,
+          double estimate = 0) {
+  const LightFieldError e = compare(truth, found);
+  std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%.0f,"seconds":%.2f,)"
+              R"("light_error":%.4f,"distance_percent":%.4f,"estimate":%.4f})"
               "\n",
-              bench, by, found.mesh.triangles.size(), found.field.degree,
-              found.mesh.position.size() * (24 + 12 * found.field.count()) + 12 * found.mesh.triangles.size(), seconds,
-              e.light, e.distance);
+              bench, by.c_str(), found.mesh.triangles.size(), found.field.degree, bytes_of(found), seconds, e.light,
+              e.distance, estimate);
   std::fflush(stdout);
 }
 
-template <class T>
-void put(std::ofstream& file, const std::vector<T>& values) {
-  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
-}
-
-/// Through tests/bench/light_field_meshopt.mjs; nothing where there is no node.
-std::optional<LitMesh> simplify_meshopt(const LitMesh& lit, std::size_t triangles, float weight) {
-  const std::string in = "/tmp/kiln_light_field.in", out = "/tmp/kiln_light_field.out";
-  {
-    std::ofstream file(in, std::ios::binary);
-    std::vector<float> colours;
-    for (std::size_t v = 0; v < lit.field.vertices(); ++v) {
-      for (std::size_t c = 0; c < 3; ++c) colours.push_back(lit.field.of(v)[c * lit.field.count()] * 0.2820948F);
-    }
-    put(file, std::vector<std::uint32_t>{static_cast<std::uint32_t>(lit.mesh.position.size()),
-                                         static_cast<std::uint32_t>(lit.mesh.triangles.size()),
-                                         static_cast<std::uint32_t>(triangles)});
-    put(file, std::vector<float>{weight});
-    put(file, lit.mesh.position), put(file, colours), put(file, lit.mesh.triangles);
-  }
-  std::remove(out.c_str());
-  const std::string command = std::string("node ") + KILN_BENCH_FOLDER + "/light_field_meshopt.mjs " + in + ' ' + out;
-  if (std::system(command.c_str()) != 0) return std::nullopt;
-  std::ifstream file(out, std::ios::binary);
-  LitMesh found = lit;
-  found.mesh.triangles.clear();
-  for (Triangle t; file.read(reinterpret_cast<char*>(t.data()), sizeof t);) found.mesh.triangles.push_back(t);
-  found.mesh.part.assign(found.mesh.triangles.size(), 0);
-  drop_unused_vertices(found);
-  return found;
+void tell_ours(const char* bench, const std::string& by, const LitMesh& truth, const Simplify& params) {
+  Threads threads;
+  const double start = process_seconds();
+  const SimplifyResult out = simplify(truth, params, threads);
+  tell(bench, by, truth, out.lit, process_seconds() - start, out.error);
 }
 
 /// Plain vertex colours: ours against meshoptimizer's attribute-aware simplifier.
@@ -193,11 +197,8 @@ void measure_colours(const std::string& model, const std::vector<std::size_t>& t
   for (const std::size_t target : targets) {
     for (const auto& [name, how] : {std::pair("edge", Collapse::edge), std::pair("half-edge", Collapse::half_edge)}) {
       for (const double weight : {0.01, 0.1}) {
-        const double start = process_seconds();
-        const LitMesh found =
-            simplify(lit, {.triangles = target, .geometry_weight = weight, .collapse = how}, threads).lit;
-        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 5);
-        tell("colours", by.c_str(), lit, found, process_seconds() - start, threads);
+        const std::string by = std::string("ours, ") + name + ", geometry " + std::to_string(weight).substr(0, 4);
+        tell_ours("colours", by, lit, {.triangles = target, .geometry_weight = weight, .collapse = how});
       }
     }
     for (const float weight : {0.0F, 0.1F, 0.3F, 1.0F, 3.0F}) {
@@ -205,27 +206,105 @@ void measure_colours(const std::string& model, const std::vector<std::size_t>& t
       const auto found = simplify_meshopt(lit, target, weight);
       if (!found) return;
       const std::string by = "meshoptimizer, weight " + std::to_string(weight).substr(0, 4);
-      tell("colours", by.c_str(), lit, *found, process_seconds() - start, threads);
+      tell("colours", by, lit, *found, process_seconds() - start);
     }
   }
 }
 
+/// Ours and extended quadrics on mean colours at the same number of triangles; the rival at its best weight.
+void measure_against_colours(const char* bench, const LitMesh& lit, double ratio, Collapse how) {
+  const auto target = static_cast<std::size_t>(ratio * static_cast<double>(lit.mesh.triangles.size()));
+  const std::string name = how == Collapse::edge ? "edge" : "half-edge";
+  tell_ours(bench, "ours, " + name, lit, {.triangles = target, .collapse = how});
+  for (const double weight : {0.01, 0.03, 0.1, 0.3, 1.0}) {
+    const double start = process_seconds();
+    const LitMesh rival = simplify_colour_qem(lit, target, how, weight);
+    const std::string by = "colour quadrics, " + name + ", weight " + std::to_string(weight).substr(0, 4);
+    tell(bench, by, lit, rival, process_seconds() - start);
+  }
+}
+
+/// Figure 7: at equal memory, fewer vertices against fewer bands.
+void measure_degrees(const std::string& model, int degree, int less) {
+  Threads threads;
+  LitMesh lit{.mesh = load_model(model), .field = {}};
+  const Coat bronze{.roughness = 0.3, .f0 = {0.7F, 0.5F, 0.3F}, .albedo = {0.02F, 0.02F, 0.02F}};
+  const Coat patina{.roughness = 0.45, .f0 = {0.3F, 0.4F, 0.35F}, .albedo = {0.05F, 0.15F, 0.12F}};
+  const auto here = [](const Vec3f& p) { return noise(p, 0.1F); };
+  lit.field = shine(lit.mesh, degree, bronze, patina, here, threads);
+  // Fitted anew: the first bands of the higher fit would be a third worse.
+  const LitMesh reduced{.mesh = lit.mesh, .field = shine(lit.mesh, less, bronze, patina, here, threads)};
+  tell("figure 7", "degree reduction", lit, reduced, 0);
+  const double bytes = bytes_of(reduced), whole = bytes_of(lit);
+  const auto target = static_cast<std::size_t>(bytes / whole * static_cast<double>(lit.mesh.triangles.size()));
+  tell_ours("figure 7", "ours, edge", lit, {.triangles = target});
+  tell_ours("figure 7", "ours, half-edge", lit, {.triangles = target, .collapse = Collapse::half_edge});
+}
+
+/// Figure 8: diffuse stripes on a specular sphere; of a paint of their own, and of one that sends the same mean colour.
+void measure_stripes() {
+  Threads threads;
+  LitMesh lit{.mesh = cube_sphere(50), .field = {}};
+  const Coat diffuse{.roughness = 1, .f0 = {}, .albedo = {0.5F, 0.4F, 0.3F}};
+  const Coat specular{.roughness = 0.3, .f0 = {0.4F, 0.4F, 0.4F}, .albedo = {0.3F, 0.2F, 0.1F}};
+  const auto stripe = [](const Vec3f& p) {
+    return std::clamp(0.5F + 4 * std::sin(25 * (p.x + 0.3F * p.y)), 0.0F, 1.0F);
+  };
+  lit.field = shine(lit.mesh, 4, diffuse, specular, stripe, threads);
+  for (const Collapse how : {Collapse::half_edge, Collapse::edge})
+    measure_against_colours("figure 8, two paints", lit, 0.5, how);
+  lit.field = shine(lit.mesh, 4, specular, specular, stripe, threads);
+  const std::vector<Vec3d> mean = mean_radiance(lit);
+  const std::size_t count = lit.field.count();
+  for (std::size_t v = 0; v < mean.size(); ++v) {
+    const float share = stripe(lit.mesh.position[v]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t i = 0; i < count; ++i) lit.field.of(v)[c * count + i] *= share;
+      lit.field.of(v)[c * count] += (1 - share) * static_cast<float>(mean[v][c]) / 0.28209479F;
+    }
+  }
+  for (const Collapse how : {Collapse::half_edge, Collapse::edge})
+    measure_against_colours("figure 8, one mean colour", lit, 0.5, how);
+}
+
+/// Figure 9: diffuse veins.
+void measure_diffuse(const std::string& model) {
+  Threads threads;
+  LitMesh lit{.mesh = load_model(model), .field = {}};
+  lit.field = bake_colours(lit.mesh, threads);
+  for (std::size_t v = 0; v < lit.mesh.position.size(); ++v) {
+    const Vec3f albedo = veins(lit.mesh.position[v]).albedo;
+    for (std::size_t c = 0; c < 3; ++c) lit.field.of(v)[c] *= albedo[c];
+  }
+  for (const double ratio : {0.25, 0.015})
+    for (const Collapse how : {Collapse::half_edge, Collapse::edge})
+      measure_against_colours("figure 9", lit, ratio, how);
+}
+
+/// The tables of core/lightfield/README.md but for a million vertices, whose memory is measured alone.
+void measure_all(const std::string& models) {
+  for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
+  for (const int degree : {0, 2, 4, 6, 8}) measure_candidate(degree);
+  const std::string bunny = models + "/scenes/bunny/bun_zipper.ply";
+  measure_colours(bunny, {17'400, 4'200, 1'000});
+  measure_degrees(models + "/scenes/buddha/buddha.glb", 8, 3);
+  measure_degrees(bunny, 6, 2);
+  measure_stripes();
+  measure_diffuse(models + "/scenes/skull/skull.glb");
+  measure_scale(100'000, 4, 0.25);
+}
+
 int main_of(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  if (what == "distance") {
-    for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
-    return 0;
-  }
-  const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
-  if (what == "scale") {
+  const std::string what = argc > 2 ? argv[1] : "";
+  if (what == "all") {
+    measure_all(argv[2]);
+  } else if (what == "scale") {
+    const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
     measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
-    return 0;
+  } else {
+    return std::fprintf(stderr, "kiln_light_field all MODELS | scale VERTICES [DEGREE] [RATIO]\n"), 2;
   }
-  if (what == "colours" && argc > 2) {
-    measure_colours(argv[2], {17'400, 4'200, 1'000});
-    return 0;
-  }
-  return std::fprintf(stderr, "kiln_light_field distance | scale [VERTICES] [DEGREE] [RATIO] | colours MODEL\n"), 2;
+  return 0;
 }
 
 }  // namespace

@@ -7,12 +7,10 @@
 
 #include "core/artifact/import.h"
 #include "core/base/random.h"
-#include "core/lightfield/hemisphere_norm.h"
-#include "core/mesh/closest_point.h"
+#include "core/lightfield/lobe_fits.h"
 #include "core/mesh/topology.h"
 #include "core/prt/direct_transfer.h"
 #include "core/sphere/quadrature.h"
-#include "core/sphere/sampling.h"
 #include "core/trace/tracer.h"
 
 namespace kiln::bench {
@@ -41,16 +39,20 @@ void weld(Mesh& mesh) {
 
 }  // namespace
 
+Vec3f sky_radiance(const Vec3d& w) {
+  const Vec3d sun = normalized(Vec3d{0.5, 0.7, 0.4}), lamp = normalized(Vec3d{-0.8, 0.2, 0.5});
+  const double s = 12 * std::exp(40 * (dot(w, sun) - 1)), l = 5 * std::exp(60 * (dot(w, lamp) - 1));
+  const double up = 0.5 + 0.5 * w.y;
+  return to_float(
+      Vec3d{s + 0.6 * l + 0.3 + 0.2 * up, 0.9 * s + 0.3 * l + 0.25 + 0.4 * up, 0.7 * s + 0.1 * l + 0.15 + 0.8 * up});
+}
+
 std::vector<float> sample_sky() {
   constexpr auto kCount = static_cast<std::size_t>(sh_count(kMaxShOrder));
   std::vector<double> sum(3 * kCount), y(kCount);
-  const Vec3d sun = normalized(Vec3d{0.5, 0.7, 0.4}), lamp = normalized(Vec3d{-0.8, 0.2, 0.5});
   for (const SphereNode& node : sphere_quadrature(60)) {
     const Vec3d& w = node.direction;
-    const double s = 12 * std::exp(40 * (dot(w, sun) - 1)), l = 5 * std::exp(60 * (dot(w, lamp) - 1));
-    const double up = 0.5 + 0.5 * w.y;
-    const double rgb[] = {s + 0.6 * l + 0.3 + 0.2 * up, 0.9 * s + 0.3 * l + 0.25 + 0.4 * up,
-                          0.7 * s + 0.1 * l + 0.15 + 0.8 * up};
+    const Vec3f rgb = sky_radiance(w);
     evaluate_sh(kMaxShOrder, w, y.data());
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t i = 0; i < kCount; ++i) sum[c * kCount + i] += node.weight * rgb[c] * y[i];
@@ -175,88 +177,43 @@ LightField bake_colours(const Mesh& mesh, Threads& threads) {
   return out;
 }
 
-namespace {
-
-constexpr std::size_t kPoints = 40'000;
-
-struct Sampled {
-  std::uint32_t triangle;
-  Vec3d weights;
-};
-
-/// Uniform by area.
-std::vector<Sampled> sample_surface(const Mesh& mesh, std::uint64_t seed) {
-  std::vector<double> sum;
-  double total = 0;
-  for (const Triangle& t : mesh.triangles) sum.push_back(total += triangle_area(mesh, t));
-  std::vector<Sampled> out;
-  for (std::size_t i = 0; i < kPoints; ++i) {
-    Random random(seed, i);
-    const auto at = std::upper_bound(sum.begin(), sum.end(), random.uniform_double() * total) - sum.begin();
-    const Vec2d uv = uniform_triangle({random.uniform_double(), random.uniform_double()});
-    out.push_back(
-        {static_cast<std::uint32_t>(std::min<std::ptrdiff_t>(at, std::ssize(sum) - 1)), {1 - uv.x - uv.y, uv.x, uv.y}});
-  }
-  return out;
-}
-
-Vec3d mix(const std::vector<Vec3f>& values, const Triangle& t, const Vec3d& w) {
-  return to_double(values[t[0]]) * w.x + to_double(values[t[1]]) * w.y + to_double(values[t[2]]) * w.z;
-}
-
-std::vector<double> mix(const LightField& field, const Triangle& t, const Vec3d& w) {
-  std::vector<double> out(3 * field.count());
-  for (std::size_t c = 0; c < 3; ++c)
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] += w[c] * field.of(t[c])[i];
-  return out;
-}
-
-/// A field of a lower degree is one of this degree with zeros.
-std::vector<double> widened(const std::vector<double>& c, std::size_t count) {
-  const std::size_t own = c.size() / 3;
-  std::vector<double> out(3 * count);
-  for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t i = 0; i < own; ++i) out[k * count + i] = c[k * own + i];
-  return out;
-}
-
-/// Mean squared distance of points of `from` from `to`; `visit(place on from, nearest on to)`.
-template <class Visit>
-double mean_squared_distance(const Mesh& from, const Mesh& to, const Visit& visit) {
-  const ClosestPoint closest(to);
-  double sum = 0;
-  for (const Sampled& s : sample_surface(from, 1)) {
-    const Triangle& t = from.triangles[s.triangle];
-    const Vec3d p = mix(from.position, t, s.weights), n = mix(from.normal, t, s.weights);
-    auto match = closest.query(p, n);
-    if (!match) match = closest.query(p, {});
-    sum += match->distance * match->distance;
-    visit(s, *match);
-  }
-  return sum / static_cast<double>(kPoints);
-}
-
-}  // namespace
-
-LightFieldError compare(const LitMesh& truth, const LitMesh& found, Threads&) {
-  const HemisphereNorm norm(truth.field.degree);
-  double difference = 0, size = 0;
-  const double there = mean_squared_distance(truth.mesh, found.mesh, [&](const Sampled& s, const SurfaceMatch& m) {
-    const Triangle& t = truth.mesh.triangles[s.triangle];
-    const Vec3d n = normalized(mix(truth.mesh.normal, t, s.weights));
-    std::vector<double> a = mix(truth.field, t, s.weights);
-    const std::vector<double> b =
-        widened(mix(found.field, found.mesh.triangles[m.triangle], {1 - m.u - m.v, m.u, m.v}), truth.field.count());
-    size += squared_norm(norm, n, a);
-    for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
-    difference += squared_norm(norm, n, a);
+LightField shine(const Mesh& mesh, int degree, const Coat& under, const Coat& over,
+                 const std::function<float(const Vec3f&)>& share, Threads& threads) {
+  Scene scene;
+  scene.mesh = mesh;
+  scene.parts.resize(1);
+  scene.materials.resize(1);
+  const Tracer tracer(scene, threads);
+  const std::vector<TransferPoint> points = vertex_points(scene.mesh);
+  const LobeFits fits(degree, threads);
+  const LobeFit fit_under = fits.at(under.roughness), fit_over = fits.at(over.roughness);
+  const std::vector<SphereNode> nodes = sphere_quadrature(40);
+  LightField out{.degree = degree, .coefficients = {}};
+  const std::size_t count = out.count();
+  out.coefficients.resize(3 * count * mesh.position.size());
+  threads.for_blocks(mesh.position.size(), 64, [&](std::size_t begin, std::size_t end) {
+    LobeSum sum_under(fit_under), sum_over(fit_over);
+    std::vector<float> a(3 * count), b(3 * count);
+    for (std::size_t v = begin; v < end; ++v) {
+      const Vec3f n = mesh.normal[v];
+      const Basis<float> frame = basis_around(n);
+      sum_under.clear(), sum_over.clear();
+      for (const SphereNode& node : nodes) {
+        const Vec3f w = to_float(node.direction);
+        if (dot(n, w) <= 0 || tracer.occluded(points[v].position + n * 1e-4F, w, 10)) continue;
+        const Vec3f light = sky_radiance(node.direction) * static_cast<float>(node.weight);
+        sum_under.add(frame.to_local(w), light);
+        sum_over.add(frame.to_local(w), light);
+      }
+      sum_under.finish(under.f0, under.albedo, 1, a);
+      sum_over.finish(over.f0, over.albedo, 1, b);
+      const float t = share(mesh.position[v]);
+      for (std::size_t i = 0; i < a.size(); ++i) a[i] += t * (b[i] - a[i]);
+      for (std::size_t c = 0; c < 3; ++c)
+        rotate_sh(degree + 1, frame, a.data() + c * count, out.of(v).data() + c * count);
+    }
   });
-  const double back = mean_squared_distance(found.mesh, truth.mesh, [](const Sampled&, const SurfaceMatch&) {});
-  Vec3f low = truth.mesh.position[0], high = low;
-  for (const Vec3f& p : truth.mesh.position)
-    for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], p[a]), high[a] = std::max(high[a], p[a]);
-  return {.light = std::sqrt(difference / size),
-          .distance = 100 * std::sqrt(0.5 * (there + back)) / length(to_double(high) - to_double(low))};
+  return out;
 }
 
 float noise(const Vec3f& p, float scale) {

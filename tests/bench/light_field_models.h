@@ -16,7 +16,8 @@ struct Paint {
   float gloss = 0;
 };
 
-/// SH coefficients of a bright sun, a blue zenith and a warm ground, order kMaxShOrder, R then G then B.
+/// A bright sun, a lamp, a blue zenith and a warm ground; and its SH of order kMaxShOrder, R then G then B.
+Vec3f sky_radiance(const Vec3d& w);
 std::vector<float> sample_sky();
 
 /// Radiance at every vertex. blur: h_l = exp(-blur l (l + 1)).
@@ -29,15 +30,17 @@ Mesh cube_sphere(std::uint32_t n);
 /// A model of the shared folder, welded, with normals of its own or smooth ones.
 Mesh load_model(const std::string& path);
 
+struct Coat {
+  double roughness = 0.3;
+  Vec3f f0{0.04F, 0.04F, 0.04F};  // of glTF's GGX lobe
+  Vec3f albedo;                   // of the diffuse layer below
+};
+/// Radiance of two materials under that sky with the surface's own shadows, mixed by the share of the second.
+LightField shine(const Mesh&, int degree, const Coat&, const Coat&, const std::function<float(const Vec3f&)>& share,
+                 Threads&);
+
 /// Diffuse light of the sample sky with its shadows, at albedo 1: constant radiance functions, traced.
 LightField bake_colours(const Mesh&, Threads&);
-
-/// How far one lit mesh is from another of the same shape, at random points of `truth` and the nearest of `found`.
-struct LightFieldError {
-  double light = 0;     // sqrt(mean d^2 / mean |L|^2), d of eq. 5 between interpolated r-RFs, at the nearest places
-  double distance = 0;  // RMS both ways, % of the diagonal of the box
-};
-LightFieldError compare(const LitMesh& truth, const LitMesh& found, Threads&);
 
 /// Smooth noise in [0, 1] with features of size `scale`.
 float noise(const Vec3f& p, float scale);

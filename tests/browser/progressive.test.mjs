@@ -62,8 +62,8 @@ test('what does not fit together is said in words', () => {
   assert.throws(spoilt(corners, vertices), /base: triangle 0/);
   const splits = corners + 4 * triangles;
   assert.throws(spoilt(splits, 0), /split 0: it brings/);
-  assert.throws(spoilt(splits + 1, vertices), /split 0: a parent/);
-  assert.throws(spoilt(splits + 3, 0x7fc00000), /split 0: errors/);
+  assert.throws(spoilt(splits + 2, vertices), /split 0: a parent/);
+  assert.throws(spoilt(splits + 4, 0x7fc00000), /split 0: errors/);
 });
 
 test('whatever bytes are changed, a file is read or refused in words', () => {

@@ -103,6 +103,21 @@ inline LitMesh sphere(std::uint32_t n, const Colour& colour = grey, int degree =
   return lit;
 }
 
+/// Every triangle with three vertices of its own, and its own normal.
+inline LitMesh flat_shaded(const LitMesh& lit) {
+  LitMesh out{.mesh = {}, .field = {.degree = lit.field.degree, .coefficients = {}}};
+  out.mesh.part = lit.mesh.part;
+  for (const Triangle& t : lit.mesh.triangles) {
+    Triangle own;
+    for (std::size_t c = 0; c < 3; ++c) {
+      own[c] = append_vertex(out, lit, t[c]);
+      out.mesh.normal.back() = normalized(area_vector(lit.mesh, t));
+    }
+    out.mesh.triangles.push_back(own);
+  }
+  return out;
+}
+
 /// How often each directed edge between places occurs. A closed manifold has each once, and its opposite.
 inline std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges_in_space(const Mesh& m) {
   const std::vector<std::uint32_t> place = weld_by_position(m.position);

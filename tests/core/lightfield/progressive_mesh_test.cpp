@@ -104,6 +104,17 @@ TEST_P(Progressive, EveryLevelIsWhatSimplifyGivesForItsNumberOfTriangles) {
   EXPECT_EQ(level_of_triangles(p, 0), 0U);
 }
 
+TEST_P(Progressive, FlatShadedMeshesComeBackToo) {
+  const LitMesh lit = testing::flat_shaded(sample(8));
+  const SimplifyResult result = recorded(lit, GetParam());
+  const ProgressiveMesh p = progressive_mesh(result.record);
+  EXPECT_EQ(soup(at_level(p, 0)), soup(result.lit));
+  EXPECT_EQ(soup(at_level(p, p.levels() - 1)), soup(lit));
+  const auto back = decode_progressive(encode_progressive(p));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(soup(at_level(*back, p.levels() / 2)), soup(at_level(p, p.levels() / 2)));
+}
+
 TEST_P(Progressive, ErrorsFallFromLevelToLevel) {
   const ProgressiveMesh p = progressive_mesh(recorded(sample(16), GetParam()).record);
   for (std::size_t level = 1; level < p.levels(); ++level) EXPECT_LE(level_error(p, level), level_error(p, level - 1));
@@ -153,6 +164,7 @@ TEST(ProgressiveMesh, FaultsNameTheirPlace) {
   expect("index_out_of_range", "split", [](ProgressiveMesh& p) { p.turned[0] = 0xfffffff0U; });
   expect("index_out_of_range", "base triangle 2", [](ProgressiveMesh& p) { p.all.mesh.triangles[2] = {1, 1, 2}; });
   expect("index_out_of_range", "split", [](ProgressiveMesh& p) { p.all.mesh.triangles.back()[0] = 1U << 31; });
+  expect("index_out_of_range", "split", [](ProgressiveMesh& p) { p.moved_vertex[0] = 1U << 30; });
   expect("slot_count_mismatch", "split 2", [](ProgressiveMesh& p) { p.splits[2].vertices = 0; });
   expect("slot_count_mismatch", "header", [](ProgressiveMesh& p) { p.splits.pop_back(); });
   expect("slot_count_mismatch", "header", [](ProgressiveMesh& p) { p.base_vertices = 1U << 31; });

@@ -243,6 +243,56 @@ TEST_P(EitherCollapse, AttributesAreThoseOfThePlaceOnTheSurface) {
   }
 }
 
+TEST_P(EitherCollapse, FlatShadedModelsSimplifyAndStayShut) {
+  const LitMesh lit = testing::flat_shaded(sphere(12));
+  const LitMesh out = simplified(lit, {.triangles = 300, .collapse = GetParam()});
+  expect_sound(out);
+  EXPECT_EQ(out.mesh.triangles.size(), 300U);
+  EXPECT_EQ(border_edges(out.mesh), 0U);
+  EXPECT_EQ(euler(out.mesh), 2);
+  for (const auto& [edge, count] : edges_in_space(out.mesh)) EXPECT_EQ(count, 1);
+  const double depth = 0.5 - std::sqrt(0.25 - 3.1416 / 300 / 0.433 / 3);  // as above
+  for (const Vec3f& p : out.mesh.position) EXPECT_NEAR(length(p), 0.5, 1.2 * depth);
+}
+
+TEST_P(EitherCollapse, WhereSeamsMeetNothingOpens) {
+  // Four quarters of a sheet, each with vertices, uvs and a part of its own: two seams that cross in the middle.
+  LitMesh lit = sheet(16, hills, [](const Vec3f& p) {
+    return Vec3f{1 + std::sin(11 * p.x), 1, 1 + std::sin(8 * p.y)};
+  });
+  lit.mesh.uv0.assign(lit.mesh.position.size(), {});
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> own;
+  for (std::size_t t = 0; t < lit.mesh.triangles.size(); ++t) {
+    const Vec3f c = centroid(lit.mesh, lit.mesh.triangles[t]);
+    const std::uint32_t part = (c.x > 0 ? 1 : 0) + (c.y > 0 ? 2 : 0);
+    lit.mesh.part[t] = part;
+    for (std::uint32_t& v : lit.mesh.triangles[t]) {
+      const auto key = std::pair(v, part);
+      if (!own.contains(key)) {
+        own[key] = append_vertex(lit, lit, v);
+        lit.mesh.uv0.back() = {static_cast<float>(part), 0};
+      }
+      v = own[key];
+    }
+  }
+  const LitMesh out = simplified(lit, {.triangles = 60, .collapse = GetParam()});
+  expect_sound(out);
+  EXPECT_LE(out.mesh.triangles.size(), 60U);
+  EXPECT_EQ(euler(out.mesh), 1);
+  const auto edges = edges_in_space(out.mesh);
+  for (const auto& [edge, count] : edges) {
+    EXPECT_EQ(count, 1);
+    if (edges.contains({edge.second, edge.first})) continue;
+    for (const std::uint32_t v : {edge.first, edge.second}) {
+      const Vec3f p = out.mesh.position[v];
+      EXPECT_NEAR(std::max(std::abs(p.x), std::abs(p.y)), 0.5, 1e-3);  // a border is the outline, never a crack
+    }
+  }
+  for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t)
+    for (const std::uint32_t v : out.mesh.triangles[t])
+      EXPECT_NEAR(out.mesh.uv0[v].x, static_cast<float>(out.mesh.part[t]), 1e-6);
+}
+
 // Bad input.
 
 LitMesh with_triangles(std::vector<Vec3f> position, std::vector<Triangle> triangles) {

@@ -22,7 +22,10 @@ interface Header {
 const kName = 'KILN_progressive_mesh';
 const kMagic = 0x4d504b31;
 const kHeader = 40; // bytes
-const kSplit = 4; // words: counts, two parents, error
+const kSplit = 5; // words: counts, turned corners, two parents, error
+const kParents = 2;
+const kError = 4;
+const kMostNew = 6; // vertices of a split
 const kMostDegree = 8;
 const kPart = 16; // of `has`
 const kOptional = [
@@ -72,7 +75,8 @@ export class ProgressiveMesh {
   private readonly splits: Uint32Array;
   private readonly errors: Float32Array;
   private readonly turned: Uint32Array;
-  private readonly moved: Column[]; // rows that change places with those of parents as splits come and go
+  private readonly movedVertex: Uint32Array;
+  private readonly moved: Column[]; // rows that change places with those of vertices as splits come and go
   private nextTurned = 0;
   private nextMoved = 0;
 
@@ -87,7 +91,8 @@ export class ProgressiveMesh {
       width * (h.vertices + h.moved) +
       h.triangles * (h.has & kPart ? 4 : 3) +
       kSplit * h.splits +
-      h.turned;
+      h.turned +
+      h.moved;
     if (4 * words !== buffer.byteLength) fail(`there are ${buffer.byteLength} bytes and not ${4 * words}`);
     let at = kHeader;
     const floats = (count: number) => new Float32Array(buffer, (at += 4 * count) - 4 * count, count);
@@ -99,6 +104,7 @@ export class ProgressiveMesh {
     this.splits = integers(kSplit * h.splits);
     this.errors = new Float32Array(buffer, this.splits.byteOffset, this.splits.length);
     this.turned = integers(h.turned);
+    this.movedVertex = integers(h.moved);
     this.moved = columns.map((c) => ({ values: floats(c.width * h.moved), width: c.width }));
     this.levels = h.splits + 1;
     this.vertexCount = h.baseVertices;
@@ -108,7 +114,7 @@ export class ProgressiveMesh {
 
   /// Of a level: an estimate of the relative RMS error against the finest one.
   error(level: number): number {
-    return level + 1 < this.levels ? this.errors[kSplit * level + 3] : 0;
+    return level + 1 < this.levels ? this.errors[kSplit * level + kError] : 0;
   }
 
   /// Takes as many steps as lie between the current level and this one.
@@ -119,18 +125,19 @@ export class ProgressiveMesh {
   }
 
   private counts(split: number) {
-    const counts = this.splits[kSplit * split];
-    return { vertices: counts & 3, triangles: (counts >> 2) & 3, moves: (counts >> 4) & 1, turned: counts >>> 8 };
+    const [counts, turned] = [this.splits[kSplit * split], this.splits[kSplit * split + 1]];
+    return { vertices: counts & 7, triangles: (counts >>> 3) & 3, pairs: (counts >>> 5) & 3, moved: counts >>> 7, turned };
+  }
+  private parent(split: number, i: number): number {
+    return this.splits[kSplit * split + kParents + i];
   }
 
   private split(): void {
-    const { vertices, triangles, moves, turned } = this.counts(this.level);
-    const parents = kSplit * this.level + 1;
-    if (moves) for (let i = 0; i < vertices; ++i) this.swap(this.splits[parents + i], this.nextMoved++);
+    const { vertices, triangles, moved, turned } = this.counts(this.level);
+    for (let k = 0; k < moved; ++k) this.swap(this.nextMoved++);
     for (let k = 0; k < turned; ++k) {
       const which = this.turned[this.nextTurned++];
-      const [triangle, i] = [which >>> 1, which & 1];
-      this.turn(triangle, this.splits[parents + i], this.vertexCount + i);
+      this.turn(which >>> 1, this.parent(this.level, which & 1), this.vertexCount + (which & 1));
     }
     this.vertexCount += vertices;
     this.triangleCount += triangles;
@@ -140,23 +147,22 @@ export class ProgressiveMesh {
   /// Undoes the last split, step by step the other way.
   private collapse(): void {
     --this.level;
-    const { vertices, triangles, moves, turned } = this.counts(this.level);
-    const parents = kSplit * this.level + 1;
+    const { vertices, triangles, moved, turned } = this.counts(this.level);
     this.vertexCount -= vertices;
     this.triangleCount -= triangles;
     for (let k = 0; k < turned; ++k) {
       const which = this.turned[--this.nextTurned];
-      const [triangle, i] = [which >>> 1, which & 1];
-      this.turn(triangle, this.vertexCount + i, this.splits[parents + i]);
+      this.turn(which >>> 1, this.vertexCount + (which & 1), this.parent(this.level, which & 1));
     }
-    if (moves) for (let i = vertices; i-- > 0; ) this.swap(this.splits[parents + i], --this.nextMoved);
+    for (let k = 0; k < moved; ++k) this.swap(--this.nextMoved);
   }
 
   private turn(triangle: number, from: number, to: number): void {
     for (let c = 3 * triangle; c < 3 * triangle + 3; ++c) if (this.triangles[c] === from) this.triangles[c] = to;
   }
 
-  private swap(vertex: number, row: number): void {
+  private swap(row: number): void {
+    const vertex = this.movedVertex[row];
     let column = 0;
     for (const { values, width } of this.columns.values()) {
       const other = this.moved[column++].values;
@@ -184,25 +190,28 @@ export class ProgressiveMesh {
     this.checkTriangles(0, h.baseTriangles, h.baseVertices, 'base');
     let before = Infinity;
     for (let s = 0; s < h.splits; ++s) {
-      const { vertices, triangles, moves, turned } = this.counts(s);
+      const { vertices, triangles, pairs, moved, turned } = this.counts(s);
       const where = `split ${s}`;
       const error = this.error(s);
-      if (vertices < 1 || vertices > 2 || triangles < 1 || triangles > 2) fail(`${where}: it brings too few or many`);
+      if (pairs < 1 || pairs > 2 || vertices < pairs || vertices > kMostNew || triangles < 1 || triangles > 2)
+        fail(`${where}: it brings too few or many`);
       if (!(error >= 0 && error <= before)) fail(`${where}: errors do not fall`);
       before = error;
-      for (let i = 0; i < vertices; ++i)
-        if (this.splits[kSplit * s + 1 + i] >= this.vertexCount) fail(`${where}: a parent is not there yet`);
+      for (let i = 0; i < pairs; ++i)
+        if (this.parent(s, i) >= this.vertexCount + vertices) fail(`${where}: a parent is not there yet`);
       if (
         this.vertexCount + vertices > h.vertices ||
         this.triangleCount + triangles > h.triangles ||
         this.nextTurned + turned > h.turned ||
-        this.nextMoved + (moves ? vertices : 0) > h.moved
+        this.nextMoved + moved > h.moved
       )
         fail(`${where}: there are fewer vertices, triangles, corners or rows than splits need`);
+      for (let k = this.nextMoved; k < this.nextMoved + moved; ++k)
+        if (this.movedVertex[k] >= this.vertexCount + vertices) fail(`${where}: a moved vertex is not there yet`);
       for (let k = this.nextTurned; k < this.nextTurned + turned; ++k) {
         const [triangle, i] = [this.turned[k] >>> 1, this.turned[k] & 1];
         const at = this.triangles.subarray(3 * triangle, 3 * triangle + 3);
-        if (triangle >= this.triangleCount || i >= vertices || !at.includes(this.splits[kSplit * s + 1 + i]))
+        if (triangle >= this.triangleCount || i >= pairs || !at.includes(this.parent(s, i)))
           fail(`${where}: a turned corner is not there`);
       }
       const first = this.triangleCount;
