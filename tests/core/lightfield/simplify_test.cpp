@@ -168,6 +168,20 @@ TEST(Simplify, AnInputBelowTheTargetStaysAsItIs) {
   EXPECT_EQ(bytes_of(out), bytes_of(lit));
 }
 
+TEST(Simplify, TellsHowFarItIs) {
+  Threads threads(1);
+  std::vector<std::uint64_t> seen;
+  Simplify params{.triangles = 100};
+  params.progress = [&](std::uint64_t done, std::uint64_t all) {
+    EXPECT_EQ(all, 2 * 60 * 60 - 100U);
+    EXPECT_LE(done, all);
+    EXPECT_TRUE(seen.empty() || done >= seen.back());
+    seen.push_back(done);
+  };
+  simplify(sheet(60, hills), params, threads);
+  EXPECT_GT(seen.size(), 3U);
+}
+
 TEST(Simplify, CanBeStopped) {
   Threads threads(1);
   threads.stop();
