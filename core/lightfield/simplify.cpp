@@ -58,6 +58,7 @@ class Simplifier {
     });
     std::vector<Candidate> first;
     for (std::uint32_t p = 0; p < mesh_.points(); ++p) {
+      if (mesh_.crowded(p)) continue;
       for (const std::uint32_t q : mesh_.ring(p))
         if (p < q) first.push_back({.a = p, .b = q});
     }
@@ -118,6 +119,7 @@ class Simplifier {
       mesh_.each_vertex(p, [&](std::uint32_t v) { cost_.update_vertex(v); });
     }
     for (const std::uint32_t p : changed_) {
+      if (mesh_.crowded(p)) continue;
       for (const std::uint32_t q : mesh_.ring(p)) {
         const bool twice = std::ranges::find(changed_, q) != changed_.end();
         if (!twice || p < q) push(p, q);

@@ -405,6 +405,23 @@ TEST_P(EitherCollapse, AMeshWoundAgainstItselfAndABowTieAreNeverPulledApart) {
   EXPECT_EQ(simplified(bow, {.triangles = 0, .collapse = GetParam()}).mesh.triangles.size(), 2U);
 }
 
+TEST_P(EitherCollapse, AHubOfThousandsOfTrianglesHoldsNobodyUp) {
+  // A disc as CAD programs write it: pairs of neighbours would be two hundred million.
+  constexpr std::uint32_t kSpokes = 20'000;
+  std::vector<Vec3f> position{{0, 0, 0}};
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < kSpokes; ++i) {
+    const double phi = 2 * std::numbers::pi * i / kSpokes;
+    position.push_back(to_float(Vec3d{std::cos(phi), std::sin(phi), 0} * 0.5));
+    triangles.push_back({0, i + 1, (i + 1) % kSpokes + 1});
+  }
+  const LitMesh out = simplified(with_triangles(position, triangles), {.triangles = 100, .collapse = GetParam()});
+  expect_sound(out);
+  EXPECT_EQ(out.mesh.triangles.size(), 100U);
+  // A polygon of 100 corners on the circle or about it.
+  EXPECT_NEAR(surface_area(out.mesh), std::numbers::pi / 4, 2e-3);
+}
+
 TEST_P(EitherCollapse, ZeroNormalsNeedlesAndRandomSoupEndSomewhere) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     Random random(seed, 5);
