@@ -62,6 +62,7 @@ CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Col
 }
 
 void CollapseCost::update_point(std::uint32_t p) {
+  if (mesh_.crowded(p)) return;
   Quadric q;
   double area = 0;
   const Vec3d at = mesh_.position(p);
@@ -88,6 +89,7 @@ void CollapseCost::update_point(std::uint32_t p) {
 }
 
 void CollapseCost::update_vertex(std::uint32_t v) {
+  if (mesh_.point(v) == SurfacePoints::kNone || mesh_.crowded(mesh_.point(v))) return;
   Gram& g = gram_[v];
   g.ring.clear();
   mesh_.around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
@@ -151,6 +153,7 @@ void CollapseCost::find_cost(CollapsePlan& plan) const {
 
 CollapsePlan CollapseCost::plan(std::uint32_t p, std::uint32_t q) const {
   CollapsePlan best;
+  if (mesh_.crowded(p) || mesh_.crowded(q)) return best;
   const auto consider = [&](CollapsePlan plan) {
     plan.possible = true;
     find_cost(plan);

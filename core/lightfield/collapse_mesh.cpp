@@ -51,7 +51,7 @@ void CollapseMesh::drop_gone(std::uint32_t v) {
 }
 
 PointKind CollapseMesh::find_kind(std::uint32_t p, bool locked) {
-  if (locked) return PointKind::locked;
+  if (locked || crowded(p)) return PointKind::locked;
   std::uint32_t borders = 0, seams = 0, vertices = 0;
   for (const std::uint32_t q : ring(p)) {
     const EdgeSides s = sides(p, q);
@@ -63,6 +63,13 @@ PointKind CollapseMesh::find_kind(std::uint32_t p, bool locked) {
   if (borders == 2 && seams == 0 && vertices == 1) return PointKind::border;
   if (borders == 0 && seams == 2 && vertices == 2) return PointKind::seam;
   return PointKind::junction;
+}
+
+bool CollapseMesh::crowded(std::uint32_t p) const {
+  int triangles = 0;
+  for (std::uint32_t v = first_vertex_[p]; v != kNone && triangles <= kCrowd; v = next_vertex_[v])
+    for (std::uint32_t corner = head_[v]; corner != kNone && triangles <= kCrowd; corner = next_[corner]) ++triangles;
+  return triangles > kCrowd;
 }
 
 const std::vector<std::uint32_t>& CollapseMesh::ring(std::uint32_t p) {

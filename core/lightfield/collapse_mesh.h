@@ -57,6 +57,9 @@ class CollapseMesh {
   void each_vertex(std::uint32_t p, const Visit& visit) const {
     for (std::uint32_t v = first_vertex_[p]; v != kNone; v = next_vertex_[v]) visit(v);
   }
+  /// More triangles than kCrowd around a point: what is paid for each pair of its neighbours would never end. Such hubs
+  /// stay, take nobody in, and cost nothing until there are fewer.
+  bool crowded(std::uint32_t p) const;
   /// Calls visit(triangle, vertex of p, next vertex, the one after).
   template <class Visit>
   void around_point(std::uint32_t p, const Visit& visit) const {
@@ -92,6 +95,7 @@ class CollapseMesh {
 
  private:
   static constexpr std::uint32_t kNone = SurfacePoints::kNone;
+  static constexpr int kCrowd = 100;
   void append(std::uint32_t v, std::uint32_t corner);
   void drop_gone(std::uint32_t v);
   void carry_rest(std::uint32_t gone, std::uint32_t kept, const EdgeSides& sides);

@@ -29,7 +29,7 @@ class Simplifier {
   SimplifyResult run() {
     prepare();
     for (std::size_t step = 0; mesh_.triangles_left() > params_.triangles && !queue_.empty(); ++step) {
-      if (step % 1024 == 0) threads_.check();
+      if (step % 1024 == 0) report();
       const Candidate c = queue_.pop();
       if (age_[c.a] + age_[c.b] != c.age) continue;
       const CollapsePlan plan = cost_.plan(c.a, c.b);
@@ -42,6 +42,12 @@ class Simplifier {
   }
 
  private:
+  void report() const {
+    threads_.check();
+    const std::uint64_t all = lit_.mesh.triangles.size();
+    if (params_.progress) params_.progress(all - mesh_.triangles_left(), all - params_.triangles);
+  }
+
   void prepare() {
     constexpr std::size_t kBlock = 1024;
     threads_.for_blocks(lit_.mesh.position.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -52,6 +58,7 @@ class Simplifier {
     });
     std::vector<Candidate> first;
     for (std::uint32_t p = 0; p < mesh_.points(); ++p) {
+      if (mesh_.crowded(p)) continue;
       for (const std::uint32_t q : mesh_.ring(p))
         if (p < q) first.push_back({.a = p, .b = q});
     }
@@ -112,6 +119,7 @@ class Simplifier {
       mesh_.each_vertex(p, [&](std::uint32_t v) { cost_.update_vertex(v); });
     }
     for (const std::uint32_t p : changed_) {
+      if (mesh_.crowded(p)) continue;
       for (const std::uint32_t q : mesh_.ring(p)) {
         const bool twice = std::ranges::find(changed_, q) != changed_.end();
         if (!twice || p < q) push(p, q);

@@ -11,6 +11,7 @@
 // Fails    never on a valid Mesh; Cancelled if stopped
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct Simplify {
   double geometry_weight = 0.01;                               // 0 .. 1; the light has the rest
   Collapse collapse = Collapse::edge;
   bool record = false;  // of every collapse, for progressive_mesh()
+  std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // triangles, now and then
 };
 
 /// What a collapse took away. Indices are of CollapseRecord::all.

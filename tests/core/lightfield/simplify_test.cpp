@@ -168,6 +168,20 @@ TEST(Simplify, AnInputBelowTheTargetStaysAsItIs) {
   EXPECT_EQ(bytes_of(out), bytes_of(lit));
 }
 
+TEST(Simplify, TellsHowFarItIs) {
+  Threads threads(1);
+  std::vector<std::uint64_t> seen;
+  Simplify params{.triangles = 100};
+  params.progress = [&](std::uint64_t done, std::uint64_t all) {
+    EXPECT_EQ(all, 2 * 60 * 60 - 100U);
+    EXPECT_LE(done, all);
+    EXPECT_TRUE(seen.empty() || done >= seen.back());
+    seen.push_back(done);
+  };
+  simplify(sheet(60, hills), params, threads);
+  EXPECT_GT(seen.size(), 3U);
+}
+
 TEST(Simplify, CanBeStopped) {
   Threads threads(1);
   threads.stop();
@@ -389,6 +403,23 @@ TEST_P(EitherCollapse, AMeshWoundAgainstItselfAndABowTieAreNeverPulledApart) {
   EXPECT_NEAR(area, 1, 1e-3);
   const LitMesh bow = with_triangles({{0, 0, 0}, {1, 1, 0}, {1, 2, 0}, {-1, 1, 0}, {-1, 2, 0}}, {{0, 1, 2}, {0, 4, 3}});
   EXPECT_EQ(simplified(bow, {.triangles = 0, .collapse = GetParam()}).mesh.triangles.size(), 2U);
+}
+
+TEST_P(EitherCollapse, AHubOfThousandsOfTrianglesHoldsNobodyUp) {
+  // A disc as CAD programs write it: pairs of neighbours would be two hundred million.
+  constexpr std::uint32_t kSpokes = 20'000;
+  std::vector<Vec3f> position{{0, 0, 0}};
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < kSpokes; ++i) {
+    const double phi = 2 * std::numbers::pi * i / kSpokes;
+    position.push_back(to_float(Vec3d{std::cos(phi), std::sin(phi), 0} * 0.5));
+    triangles.push_back({0, i + 1, (i + 1) % kSpokes + 1});
+  }
+  const LitMesh out = simplified(with_triangles(position, triangles), {.triangles = 100, .collapse = GetParam()});
+  expect_sound(out);
+  EXPECT_EQ(out.mesh.triangles.size(), 100U);
+  // A polygon of 100 corners on the circle or about it.
+  EXPECT_NEAR(surface_area(out.mesh), std::numbers::pi / 4, 2e-3);
 }
 
 TEST_P(EitherCollapse, ZeroNormalsNeedlesAndRandomSoupEndSomewhere) {
