@@ -1,6 +1,7 @@
 // The light worker: opens one asset, holds its transfer vectors and answers messages.ts.
 
 import { loadDraco } from '../asset/draco_module';
+import type { FieldTexels } from '../asset/light_field';
 import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
 import { gatherRows, type LightLinks, lightSenders, readVertices, solveNodes } from './links';
@@ -34,6 +35,13 @@ async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
   [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
   links = unpacked.links;
   return unpacked.file;
+}
+
+/// It is the page's: nothing here asks for it again.
+function takeField(): FieldTexels[] | null {
+  const field = parts.flatMap((part) => part.field ?? []);
+  for (const part of parts) part.field = null;
+  return field.length > 0 ? field : null;
 }
 
 /// Place and unit normal of each sample of the senders.
@@ -143,7 +151,9 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
     if (data.kind === 'open') {
       const opened = await open(data);
       const samples = links && samplesOf(links);
-      send({ serial, opened, samples }, samples ? [opened, samples.buffer] : [opened]);
+      const field = takeField();
+      const give = [...(samples ? [samples] : []), ...(field ?? []).map(({ halves }) => halves)];
+      send({ serial, opened, samples, field }, [opened, ...give.map(({ buffer }) => buffer)]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);
