@@ -1,11 +1,13 @@
-// Light fields: the reader against kiln.
+// Light fields: the reader against kiln, the picture against the reader.
 //
 // fixtures/field.glb is a ball of metal over a floor, degree 4; lod1.glb and lod2.glb are the same with fewer vertices.
 // field.csv is what core/lightfield/seen.cpp says that eyes see of it (fixtures/make_field.sh, print_seen.cpp).
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
-import { test } from 'node:test';
+import { after, before, test } from 'node:test';
+import { openPage, ready, startBrowser, until, withReady } from './browser.mjs';
+import { jobId, startMock } from './mock_server.mjs';
 import { glbJson } from './read_glb.mjs';
 import { fromViewer, load } from './sources.mjs';
 
@@ -159,4 +161,240 @@ test('a primitive without its numbers is refused by their name', () => {
   const packed = readPacked(bytesOf(file));
   delete packed.json.meshes[0].primitives[1].extensions.KHR_draco_mesh_compression.attributes._SLF_3;
   assert.throws(() => unpack(draco, packed), /lacks _SLF_3/);
+});
+
+let browser, mock;
+before(async () => {
+  browser = await startBrowser();
+  mock = await startMock({ files: { 'scene.glb': file } });
+  const { artifacts } = mock.jobs.get(jobId('done'));
+  for (const name of ['lod2.glb', 'lod1.glb']) artifacts.push({ ...artifacts[0], name, bytes: fixture(name).length });
+});
+after(async () => {
+  await browser.close();
+  await mock.close();
+});
+
+const address = (hash) => `${mock.url}/view/${jobId('done')}#${hash}`;
+const withField = (hash, act) => withReady(browser, address(hash), act);
+
+/// Pixels well inside triangles of the ball that face the eye: their colour, and what the reader says is seen there, at
+/// the pixel and at the corners of its triangle.
+const look = (page, pose) =>
+  page.evaluate((pose) => {
+    const { stage, model, level } = window.kilnViewer;
+    if (pose) stage.pose = pose;
+    stage.drawNow();
+    stage.camera.updateMatrixWorld();
+    const { mesh: object, geometry } = model.parts[0];
+    const eye = stage.camera.position;
+    const gl = stage.renderer.getContext();
+    const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    const { index, attributes } = geometry;
+    const placeOf = (v) => eye.clone().fromBufferAttribute(attributes.position, v).applyMatrix4(object.matrixWorld);
+    const cornersOf = (face) => [0, 1, 2].map((k) => placeOf(index.getX(3 * face + k)));
+    const seenAt = (faceIndex, weights, [a, b, c]) => {
+      const point = a.clone().multiplyScalar(weights[0]).addScaledVector(b, weights[1]).addScaledVector(c, weights[2]);
+      return level.field.seenAt({ object, faceIndex, barycoord: { toArray: () => weights }, point }, eye);
+    };
+    const seen = [];
+    for (let face = 0; face < index.count / 3; ++face) {
+      const [a, b, c] = cornersOf(face);
+      const [ab, ac] = [b.clone().sub(a), c.clone().sub(a)];
+      const normal = ab.clone().cross(ac);
+      const centre = a.clone().add(b).add(c).divideScalar(3);
+      if (normal.clone().normalize().dot(eye.clone().sub(centre).normalize()) < 0.3) continue;
+      const screen = centre.project(stage.camera);
+      const [x, y] = [Math.floor(((screen.x + 1) / 2) * width), Math.floor(((screen.y + 1) / 2) * height)];
+      // The ray through the pixel's centre, and where it meets the triangle's plane.
+      const through = eye.clone().set((2 * (x + 0.5)) / width - 1, (2 * (y + 0.5)) / height - 1, 0.5);
+      const ray = through.unproject(stage.camera).sub(eye);
+      const at = ray.multiplyScalar(a.clone().sub(eye).dot(normal) / ray.dot(normal)).add(eye).sub(a);
+      const area = normal.lengthSq();
+      const [u, v] = [at.clone().cross(ac).dot(normal) / area, ab.clone().cross(at).dot(normal) / area];
+      if (Math.min(u, v, 1 - u - v) < 0.15) continue; // no edge runs through the pixel
+      const pixel = new Uint8Array(4);
+      gl.readPixels(x, y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      const one = (k) => [0, 1, 2].map((i) => (i === k ? 1 : 0));
+      seen.push({
+        face,
+        weights: [1 - u - v, u, v],
+        colour: [...pixel.slice(0, 3)].map((value) => value / 255),
+        expected: seenAt(face, [1 - u - v, u, v], [a, b, c]),
+        corners: [0, 1, 2].map((k) => seenAt(face, one(k), [a, b, c])),
+      });
+    }
+    return { seen, exposure: stage.renderer.toneMappingExposure };
+  }, pose);
+
+const encode = (linear) => (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055);
+const display = (radiance, exposure) => radiance.map((x) => encode(Math.min(1, exposure * x)));
+const kSteps = 1.6 / 255; // rounding to bytes, and dithering by up to one of them
+const near = (shown, expected, tolerance) =>
+  shown.forEach((x, c) => assert.ok(Math.abs(x - expected[c]) < tolerance, `${shown} is not ${expected}`));
+
+test('a pixel is what the reader sees there, from wherever one looks, and highlights move', () =>
+  withField('tone=none&ev=-2&background=off', async (page) => {
+    const brightest = [];
+    for (const pose of [
+      [0.9, 0.84, 1.8, 0, 0.3, 0],
+      [-1.8, 0.3, -0.4, 0, 0.3, 0],
+      [0.3, -0.4, 1.9, 0, 0.3, 0],
+    ]) {
+      const { seen, exposure } = await look(page, pose);
+      assert.ok(seen.length > 20);
+      for (const { colour, expected } of seen) near(colour, display(expected, exposure), kSteps);
+      const size = (one) => one.expected[1];
+      brightest.push(seen.reduce((a, b) => (size(a) > size(b) ? a : b)).face);
+    }
+    assert.notEqual(brightest[0], brightest[1], 'the highlight stays where it was');
+  }));
+
+const between = ({ corners, weights }) =>
+  [0, 1, 2].map((c) => corners.reduce((sum, one, k) => sum + weights[k] * one[c], 0));
+
+test('evaluated at the vertices a pixel is what the corners show', () =>
+  withField('mode=vertices&tone=none&ev=-2&background=off', async (page) => {
+    const { seen, exposure } = await look(page, [0.9, 0.84, 1.8, 0, 0.3, 0]);
+    assert.ok(seen.length > 20);
+    for (const one of seen) near(one.colour, display(between(one), exposure), kSteps);
+  }));
+
+const { colourAt } = await load('shaders/colour_maps.ts');
+
+test('the false colours of what vertices miss are the difference of the two evaluations', () =>
+  withField('mode=vertexError&ev=0', async (page) => {
+    const { seen, exposure } = await look(page, [0.9, 0.84, 1.8, 0, 0.3, 0]);
+    let largest = 0;
+    for (const one of seen) {
+      const apart = between(one).map((x, c) => exposure * Math.abs(x - one.expected[c]));
+      const t = Math.min(1, Math.max(...apart) / 0.2);
+      largest = Math.max(largest, t);
+      // A byte of the scale, which is at most 4 bytes of a channel; half floats are 2^-11 of radiances up to 1 apart.
+      near(one.colour, colourAt('viridis', t).map((byte) => byte / 255), 0.03);
+    }
+    assert.ok(largest > 0.1, 'nothing differs');
+    assert.match(await page.locator('.legend').innerText(), /0\.200 and above/);
+  }));
+
+const vertices = (page) => page.evaluate(() => window.kilnViewer.model.vertices);
+const memory = (page) =>
+  page.evaluate(() => {
+    window.kilnViewer.stage.drawNow();
+    const { geometries, textures } = window.kilnViewer.stage.renderer.info.memory;
+    return `${geometries} geometries, ${textures} textures`;
+  });
+const showLevel = async (page, level) => {
+  await page.evaluate((at) => window.kilnViewer.state.set({ level: at }), level);
+  await until(page, (at) => window.kilnViewer.shown.get().index === at, level);
+};
+
+test('levels of detail follow the slider, under the same eye, and leave nothing behind', () =>
+  withField('background=off', async (page) => {
+    const slider = page.locator('#c-level');
+    assert.equal(await slider.getAttribute('max'), '2');
+    const pose = await page.evaluate(() => window.kilnViewer.stage.pose);
+    const [finest, before] = [await vertices(page), await memory(page)];
+    await slider.fill('1');
+    await until(page, () => window.kilnViewer.shown.get().index === 1);
+    const middle = await vertices(page);
+    await slider.fill('2');
+    await until(page, () => window.kilnViewer.shown.get().index === 2);
+    assert.ok(finest > middle && middle > (await vertices(page)));
+    assert.deepEqual(await page.evaluate(() => window.kilnViewer.stage.pose), pose);
+    const { seen, exposure } = await look(page);
+    for (const { colour, expected } of seen.slice(0, 5))
+      near(colour, display(expected.map((x) => shoulder(exposure * x)), 1), kSteps);
+    assert.match(await page.locator('.levels [aria-current=true]').innerText(), /^lod2\.glb/);
+    await slider.fill('0');
+    await until(page, () => window.kilnViewer.shown.get().index === 0);
+    assert.equal(await vertices(page), finest);
+    assert.equal(await memory(page), before);
+  }));
+
+const shoulder = (x) => (x <= 0.6 ? x : 1 - 0.4 * Math.exp((0.6 - x) / 0.4));
+
+/// How many pixels are not the lowest colour of the scale nor the background, and how many are the lowest.
+const differing = (page) =>
+  page.evaluate(() => {
+    const { stage } = window.kilnViewer;
+    stage.drawNow();
+    const gl = stage.renderer.getContext();
+    const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+    gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    let [same, other] = [0, 0];
+    for (let i = 0; i < pixels.length; i += 4) {
+      const [r, g, b] = pixels.subarray(i, i + 3);
+      if (r === 0x5b && g === 0x5e && b === 0x64) continue;
+      if (Math.abs(r - 0x44) < 2 && Math.abs(g - 0x01) < 2 && Math.abs(b - 0x54) < 2) ++same;
+      else ++other;
+    }
+    return { same, other };
+  });
+
+test('a level differs from the finest, and the finest from itself nowhere', () =>
+  withField('mode=levelError', async (page) => {
+    const alone = await differing(page);
+    assert.ok(alone.same > 10000);
+    // Where the silhouette covers a part of a pixel the lowest colour is mixed with the background.
+    assert.ok(alone.other < 0.1 * alone.same, JSON.stringify(alone));
+    await showLevel(page, 2);
+    const { other } = await differing(page);
+    assert.ok(other > 5 * alone.other, JSON.stringify({ other, alone }));
+  }));
+
+test('an address asks for a level; one that is not there is said, and the finest stays', async () => {
+  await withField('level=2', async (page) => {
+    await until(page, () => window.kilnViewer.shown.get().index === 2);
+  });
+  await withField('level=7', async (page) => {
+    await until(page, () => /no level of detail 7/.test(document.body.innerText));
+    assert.equal(await page.evaluate(() => window.kilnViewer.state.get().level), 0);
+  });
+});
+
+test('wireframe, false colours and light alone follow from one look and level to another', () =>
+  withField('', async (page) => {
+    const set = (state) => page.evaluate((s) => window.kilnViewer.state.set(s), state);
+    const round = async () => {
+      for (const mode of ['vertices', 'light', 'measure', 'coefficient', 'vertexError', 'levelError', 'shaded'])
+        for (const wire of [true, false]) {
+          await set({ mode, wire });
+          await page.evaluate(() => window.kilnViewer.stage.drawNow());
+        }
+      return memory(page);
+    };
+    const before = await round(); // has met everything that stays
+    assert.equal(await round(), before);
+    await set({ mode: 'light', wire: true });
+    await showLevel(page, 1);
+    await set({ mode: 'shaded', wire: false });
+    await showLevel(page, 0);
+    const { seen, exposure } = await look(page);
+    near(seen[0].colour, display(seen[0].expected.map((x) => shoulder(exposure * x)), 1), kSteps);
+  }));
+
+test('a click on the model tells the radiance towards the eye', () =>
+  withField('background=off', async (page) => {
+    const { x, y, width, height } = await page.locator('canvas').first().boundingBox();
+    await page.mouse.click(x + 0.5 * width, y + 0.5 * height);
+    assert.match(await page.locator('.probe').innerText(), /^Radiance .+ towards the eye$/);
+  }));
+
+test('what does not fit a texture of the graphics card is said, and diffuse light is shown', async () => {
+  const page = await openPage(browser, 'about:blank');
+  await page.addInitScript(() => {
+    const real = WebGL2RenderingContext.prototype.getParameter;
+    WebGL2RenderingContext.prototype.getParameter = function (name) {
+      return name === this.MAX_TEXTURE_SIZE ? 40 : real.call(this, name);
+    };
+  });
+  try {
+    await page.goto(address(''));
+    await ready(page);
+    await until(page, () => /larger than a texture may be/.test(document.body.innerText));
+    assert.equal(await page.evaluate(() => window.kilnViewer.level.field), null);
+  } finally {
+    await page.context().close();
+  }
 });

@@ -4,7 +4,18 @@
 import type { CameraPose } from './stage';
 
 export type ToneMap = 'baked' | 'neutral' | 'aces' | 'none';
-export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient' | 'grid';
+export const kModes = [
+  'shaded',
+  'light',
+  'measure',
+  'weighted',
+  'coefficient',
+  'grid',
+  'vertices', // a light field evaluated at the vertices
+  'vertexError', // how far that is from evaluating it at each pixel
+  'levelError', // how far a level of detail is from the finest
+] as const;
+export type Mode = (typeof kModes)[number];
 export type Background = 'off' | 'sky' | 'harmonics';
 
 export interface ViewState {
@@ -19,6 +30,7 @@ export interface ViewState {
   mode: Mode;
   channel: number;
   slot: number;
+  level: number; // of detail; 0: the finest
   ball: boolean; // of a grid: see grid_view.ts
   ballAt: readonly [number, number, number] | null; // from the middle of the grid, in its half extents
   cells: boolean;
@@ -44,6 +56,7 @@ export const kDefaultState: ViewState = {
   mode: 'shaded',
   channel: 0,
   slot: 0,
+  level: 0,
   ball: true,
   ballAt: null,
   cells: false,
@@ -100,9 +113,10 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     tone: one<ToneMap>('tone', ['baked', 'neutral', 'aces', 'none']),
     background: one<Background>('background', ['off', 'sky', 'harmonics']),
     wire: flag('wire'),
-    mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient', 'grid']),
+    mode: one<Mode>('mode', kModes),
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
+    level: Math.round(number('level', 0, 99)),
     ball: flag('ball'),
     ballAt: placeIn(from.get('ballAt')),
     cells: flag('cells'),

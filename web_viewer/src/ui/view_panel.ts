@@ -6,6 +6,7 @@ import type { Store } from '../main/store';
 import type { ViewState } from '../main/view_state';
 import { Controls } from './controls';
 import { h, toast } from './dom';
+import { type LevelRow, levelSlider } from './levels';
 
 const kDegrees = (value: number) => `${Math.round(value)}°`;
 
@@ -17,6 +18,7 @@ export interface Shown {
   readonly lampSamples?: Float32Array | null; // the file has links for lamps that move
   readonly asset: { hasOriginal: boolean };
   readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
+  readonly level?: { field: unknown }; // null: the model has no light field
   onLights: () => void;
   useFile(file: File): Promise<void>;
 }
@@ -31,7 +33,7 @@ export class ViewPanel {
   constructor(
     private readonly viewer: Shown,
     statistics: HTMLElement,
-    private readonly hasGrid: boolean,
+    private readonly has: { grid: boolean; levels: readonly LevelRow[] },
   ) {
     this.controls = new Controls(viewer.state);
     this.element = h(
@@ -47,9 +49,7 @@ export class ViewPanel {
   private light(): HTMLElement[] {
     const { controls, viewer } = this;
     if (viewer.lights.order === 0)
-      return viewer.lampSamples
-        ? this.lamp()
-        : [h('p', {}, `${viewer.lights.choices[0].label}. Radiosity is the light of the bake and cannot be changed.`)];
+      return viewer.lampSamples ? this.lamp() : [h('p', {}, `${viewer.lights.choices[0].label}. ${this.unchangeable}`)];
     const picker = controls.select('light', 'Environment', () => viewer.lights.choices);
     viewer.onLights = picker.refill;
     const file = h('input', { type: 'file', id: 'environment-file', accept: '.hdr,.exr' });
@@ -64,6 +64,11 @@ export class ViewPanel {
     return out;
   }
 
+  private get unchangeable(): string {
+    const what = this.viewer.level?.field ? 'A light field' : 'Radiosity';
+    return `${what} is the light of the bake and cannot be changed.`;
+  }
+
   private lamp(): HTMLElement[] {
     const { controls } = this;
     return [
@@ -76,7 +81,7 @@ export class ViewPanel {
 
   async useFile(file: File): Promise<void> {
     try {
-      if (this.viewer.lights.order === 0) throw new Error('Radiosity is the light of the bake and cannot be changed.');
+      if (this.viewer.lights.order === 0) throw new Error(this.unchangeable);
       await this.viewer.useFile(file);
       toast(`${file.name} lights the scene`);
     } catch (error) {
@@ -117,7 +122,14 @@ export class ViewPanel {
       { id: 'weighted', label: 'Where to refine, by area' },
       { id: 'coefficient', label: 'One coefficient' },
     ];
-    if (this.hasGrid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
+    const [hasField, hasLevels] = [Boolean(viewer.level?.field), this.has.levels.length > 1];
+    if (hasField) {
+      modes[0].label = 'Light field, at each pixel';
+      modes.splice(1, 0, { id: 'vertices', label: 'Light field, at the vertices' });
+      modes.push({ id: 'vertexError', label: 'What the vertices miss of it' });
+    }
+    if (hasLevels) modes.push({ id: 'levelError', label: 'What this level of detail misses' });
+    if (this.has.grid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
     if (!viewer.model.transfer) return this.showPlain();
     const { channels, slots } = viewer.model.transfer;
     const slot = h(
@@ -131,8 +143,9 @@ export class ViewPanel {
     return [
       controls.select('mode', 'Surface', () => modes).element,
       slot,
+      ...(hasLevels ? [levelSlider(controls, this.has.levels)] : []),
       controls.checkbox('wire', 'Wireframe'),
-      ...(this.hasGrid ? this.grid() : []),
+      ...(this.has.grid ? this.grid() : []),
       compareSwitch(viewer, controls),
     ];
   }
