@@ -15,7 +15,7 @@
 #include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_step.h"
 #include "core/bake/job_light.h"
-#include "core/bake/light_field_certificate.h"
+#include "core/bake/light_field_stage.h"
 #include "core/bake/light_field_step.h"
 #include "core/bake/lightings.h"
 #include "core/bake/links_step.h"
@@ -115,7 +115,7 @@ struct Pass {
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
   std::optional<LinksOutcome> links;
-  std::optional<FieldReport> field;
+  std::optional<FieldOutcome> field;
   std::optional<GlossyReport> glossy;
 };
 
@@ -184,19 +184,16 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   const NoiseProbes noise = std::move(transport.noise);
   pass.bounce_rays = transport.bounce_rays;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
+  std::optional<LightFieldStage> stage;
+  if (outgoing) stage.emplace(baked, std::move(*outgoing), plan, log, threads);
   Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   if (baked.glossy)
     encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
-  if (outgoing) {
-    pass.field.emplace(FieldReport{.degree = outgoing->field.degree, .noise = outgoing->noise});
-    encoding.field = choose_field_encoding(outgoing->field, baked.scene.mesh, plan);
-    pass.field->rank = encoding.field.components.rank();
-    baked.field = std::move(outgoing->field);
-  }
+  if (stage) encoding.field = stage->encoding();
   const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.direct.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
-  scene = std::move(baked.scene);
+  scene = stage ? stage->take_surface() : std::move(baked.scene);
   baked = {};  // from here on the delivered file is what counts
   KILN_TRY(decoded, reopen(glb, scene));
   threads.check();
@@ -214,9 +211,9 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
         {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
     if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
   }
-  if (pass.field && input.recipe.certificate) {
-    const Tracer truth(scene, threads);
-    pass.field->certificate = certify_field({decoded, truth, light, log.rays(), input.recipe.seed}, threads);
+  if (stage) {
+    KILN_TRY(outcome, stage->finish(glb, decoded, {scene, light, input.recipe}, log, threads));
+    pass.field = std::move(outcome);
   }
   if (decoded.glossy) {
     pass.glossy = GlossyReport{.order = decoded.glossy.order,
@@ -345,6 +342,12 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});
   if (pass.grid) output.files.push_back({"grid.exr", "image/x-exr", std::move(pass.grid->file)});
+  if (pass.field) {
+    for (std::size_t k = 0; k < pass.field->lods.size(); ++k) {
+      output.files.push_back(
+          {"lod" + std::to_string(k + 1) + ".glb", "model/gltf-binary", std::move(pass.field->lods[k])});
+    }
+  }
   output.files.push_back({"preview.png", "image/png", std::move(preview)});
   output.files.push_back({"report.json", "application/json", to_bytes(report)});
   output.files.push_back(

@@ -15,7 +15,7 @@
 namespace kiln {
 
 /// Part of every result's identity: the same scene, recipe and engine give the same bytes.
-inline constexpr const char* kEngineVersion = "0.10.0";
+inline constexpr const char* kEngineVersion = "0.11.0";
 
 struct BakeInput {
   SceneFiles scene;
@@ -26,7 +26,7 @@ struct BakeInput {
   std::string spill_folder = ".";  // where a reduction puts aside what does not fit into memory
 };
 
-/// Named files with their media types: scene.glb, grid.exr where the recipe has the step, preview.png (a
+/// Named files with their media types: scene.glb, lod1.glb and on and grid.exr where the recipe asks for them, preview.png (a
 /// reduction leaves it out where memory does not allow it), report.json, log.txt.
 struct ArtifactFile {
   std::string name;

@@ -44,6 +44,27 @@ void add_prediction(Plan& plan) {
   plan.prediction.artifact_bytes += static_cast<std::uint64_t>(vertices * numbers * kBytesANumber);
 }
 
+void decide_simplification(Plan& plan, const LightFieldStep& step, const FieldEffort& effort) {
+  const LightFieldStep::Simplification& s = step.simplify;
+  FieldPlan& f = *plan.field;
+  f.lods = step.lods;
+  f.progressive = step.progressive;
+  if (s.off) return decide(plan, "simplify", "no", "turned off by the recipe");
+  Simplify& out = f.simplify.emplace();
+  out.geometry_weight = s.geometry_weight;
+  out.collapse = s.collapse;
+  const bool asked = s.ratio || s.triangles || s.max_error;
+  f.ratio = s.ratio;
+  if (s.triangles) out.triangles = *s.triangles;
+  if (s.max_error || !asked) out.max_error = s.max_error.value_or(effort.storage);
+  decide(
+      plan, "simplify",
+      s.ratio       ? "to " + short_text(100 * *s.ratio) + " %"
+      : s.triangles ? "to " + std::to_string(*s.triangles) + " triangles"
+                    : "by at most " + short_text(100 * out.max_error) + " % of the light",
+      asked ? "asked for by the recipe" : effort.reason + std::string(" merges vertices that the light does not need"));
+}
+
 TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
   return {mesh.position[t[0]], mesh.normal[t[0]], mesh.position[t[0]], mesh.normal[t[0]]};
 }
@@ -71,6 +92,7 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
   decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
          (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
+  decide_simplification(plan, step, effort);
   add_prediction(plan);
   return plan;
 }

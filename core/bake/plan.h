@@ -12,6 +12,7 @@
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
 #include "core/lightfield/outgoing.h"
+#include "core/lightfield/simplify.h"
 #include "core/meshless/link_builder.h"
 #include "core/meshless/radiosity.h"
 #include "core/prt/subdivide.h"
@@ -29,7 +30,11 @@ struct Decision {
 /// What the step `lightfield` will do beside `radiosity`.
 struct FieldPlan {
   OutgoingBake outgoing;
-  double storage = 0.01;  // relRMSE that components and rounding may add
+  double storage = 0.01;             // relRMSE that components and rounding may add
+  std::optional<Simplify> simplify;  // what the delivered scene goes through
+  std::optional<double> ratio;       // of the baked triangles: simplify->triangles, once they are known
+  int lods = 0;                      // coarser levels, each of a quarter of the triangles before it
+  bool progressive = false;          // KILN_progressive_mesh
 };
 
 struct Plan {

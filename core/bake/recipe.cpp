@@ -158,6 +158,27 @@ TransportStep read_transport(JsonFields& fields, const std::string& pointer, Err
   return step;
 }
 
+LightFieldStep::Simplification read_simplification(const json& value, const std::string& pointer, Errors& errors) {
+  LightFieldStep::Simplification out;
+  if (value.is_string()) {
+    out.off = value == "off";
+    if (value != "off" && value != "auto")
+      errors.push_back({pointer, "must be auto, off or an object", shown(value), "auto, off, object"});
+    return out;
+  }
+  JsonFields fields(value, pointer, errors);
+  out.ratio = fields.number("ratio", 1e-6, 1);
+  if (const auto n = fields.integer("triangles", 4, kMaxBudget)) out.triangles = static_cast<std::uint64_t>(*n);
+  out.max_error = fields.number("max_error", 0, 1);
+  constexpr Collapse kCollapses[] = {Collapse::edge, Collapse::half_edge};
+  if (const auto collapse = fields.word("collapse", {"edge", "half-edge"})) out.collapse = kCollapses[*collapse];
+  out.geometry_weight = fields.number("geometry_weight", 0, 1).value_or(out.geometry_weight);
+  fields.finish();
+  if (out.ratio && out.triangles)
+    fields.error("ratio", "means nothing where triangles are given", "triangles or ratio");
+  return out;
+}
+
 LightFieldStep read_light_field(JsonFields& fields, const std::string& pointer, Errors& errors) {
   LightFieldStep step;
   fields.word("basis", {"sh"});
@@ -166,6 +187,10 @@ LightFieldStep read_light_field(JsonFields& fields, const std::string& pointer, 
   if (const auto n = fields.integer_or_auto("bounces", 0, 1000)) step.surface.bounces = static_cast<int>(*n);
   if (const json* value = fields.find("subdivide"))
     step.surface.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
+  if (const json* value = fields.find("simplify"))
+    step.simplify = read_simplification(*value, pointer + "/simplify", errors);
+  step.lods = static_cast<int>(fields.integer("lods", 0, 8).value_or(0));
+  step.progressive = fields.boolean("progressive").value_or(false);
   return step;
 }
 
@@ -423,13 +448,26 @@ json step_json(const TransportStep& step) {
   return out;
 }
 
+json simplification_json(const LightFieldStep::Simplification& s) {
+  if (s.off) return "off";
+  json out = {{"collapse", s.collapse == Collapse::edge ? "edge" : "half-edge"},
+              {"geometry_weight", s.geometry_weight}};
+  if (s.ratio) out["ratio"] = *s.ratio;
+  if (s.triangles) out["triangles"] = *s.triangles;
+  if (s.max_error) out["max_error"] = *s.max_error;
+  return out;
+}
+
 json step_json(const LightFieldStep& step) {
   return {{"do", "lightfield"},
           {"basis", "sh"},
           {"degree", or_auto(step.degree)},
           {"rays", or_auto(step.rays)},
           {"bounces", or_auto(step.surface.bounces)},
-          {"subdivide", subdivision_json(step.surface.subdivide)}};
+          {"subdivide", subdivision_json(step.surface.subdivide)},
+          {"simplify", simplification_json(step.simplify)},
+          {"lods", step.lods},
+          {"progressive", step.progressive}};
 }
 
 json step_json(const GridStep& step) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/grid/grid.h"
+#include "core/lightfield/collapse_cost.h"
 #include "core/prt/subdivide.h"
 #include "core/reduce/reduce_method.h"
 
@@ -87,6 +88,16 @@ struct LightFieldStep {
   RadiosityStep surface;      // bounces and subdivision; the rest is automatic
   std::optional<int> degree;  // bands 0 .. degree
   std::optional<int> rays;    // of a vertex
+  struct Simplification {     // auto when none of the three is given
+    bool off = false;
+    std::optional<double> ratio;             // of the baked triangles
+    std::optional<std::uint64_t> triangles;  // of the result
+    std::optional<double> max_error;         // relRMSE that it may add, as simplify.h estimates it
+    Collapse collapse = Collapse::edge;
+    double geometry_weight = 0.01;
+  } simplify;
+  int lods = 0;
+  bool progressive = false;
 };
 
 /// Fewer triangles, and a normal map for what they do not hold (core/reduce/reduce.h).

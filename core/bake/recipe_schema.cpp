@@ -102,7 +102,23 @@ std::string recipe_schema() {
         "degree": {"description": "bands 0 .. degree of radiance towards the eye; coefficients = (degree + 1)^2", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 8}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "rays": {"description": "of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "bounces": {"$ref": "#/definitions/gather_bounces"},
-        "subdivide": {"$ref": "#/definitions/subdivide"}
+        "subdivide": {"$ref": "#/definitions/subdivide"},
+        "simplify": {
+          "default": "auto",
+          "anyOf": [{"enum": ["auto", "off"]}, {
+            "type": "object", "additionalProperties": false,
+            "not": {"required": ["triangles", "ratio"]},
+            "properties": {
+              "ratio": {"description": "of the baked triangles", "type": "number", "minimum": 1e-6, "maximum": 1},
+              "triangles": {"description": "of the result, at most, where topology allows", "type": "integer", "minimum": 4, "maximum": 50000000},
+              "max_error": {"description": "relRMSE that simplification may add, by its own estimate", "type": "number", "minimum": 0, "maximum": 1},
+              "collapse": {"description": "where joint vertices lie: where quadrics are least, or at one end", "enum": ["edge", "half-edge"], "default": "edge"},
+              "geometry_weight": {"description": "share of shape in the cost of a collapse; light has the rest", "type": "number", "minimum": 0, "maximum": 1, "default": 0.01}
+            }
+          }]
+        },
+        "lods": {"description": "coarser files lod1.glb ..., each of a quarter of the triangles before it", "type": "integer", "minimum": 0, "maximum": 8, "default": 0},
+        "progressive": {"description": "KILN_progressive_mesh in scene.glb: every level of detail by vertex splits", "type": "boolean", "default": false}
       }
     },
     "light": {"anyOf": [{"$ref": "#/definitions/prt"}, {"$ref": "#/definitions/radiosity"}, {"$ref": "#/definitions/grid"}, {"$ref": "#/definitions/transport"}, {"$ref": "#/definitions/lightfield"}]},

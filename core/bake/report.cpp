@@ -167,14 +167,34 @@ ordered_json links_object(const LinksOutcome& links) {
           {"certificate", links_certificate_object(links.certificate)}};
 }
 
-ordered_json field_object(const FieldReport& f) {
-  ordered_json out = {{"degree", f.degree}, {"noise", f.noise}, {"rank", f.rank}, {"certificate", nullptr}};
-  if (!f.certificate) return out;
-  out["certificate"] = error_object(f.certificate->radiance);
-  out["certificate"]["points"] = f.certificate->points;
-  out["certificate"]["samples"] = f.certificate->samples;
-  out["certificate"]["seconds"] = f.certificate->seconds;
+ordered_json field_certificate_object(const std::optional<FieldCertificate>& certificate) {
+  if (!certificate) return nullptr;
+  ordered_json out = error_object(certificate->radiance);
+  out["points"] = certificate->points;
+  out["samples"] = certificate->samples;
+  out["seconds"] = certificate->seconds;
   return out;
+}
+
+ordered_json field_object(const FieldOutcome& f) {
+  ordered_json levels = ordered_json::array();
+  for (const FieldLevelReport& level : f.levels) {
+    levels.push_back({{"file", level.file},
+                      {"triangles", level.triangles},
+                      {"vertices", level.vertices},
+                      {"bytes", level.bytes},
+                      {"simplification", level.estimate},
+                      {"reached", level.reached},
+                      {"certificate", field_certificate_object(level.certificate)}});
+  }
+  return {{"degree", f.degree},
+          {"noise", f.noise},
+          {"rank", f.rank},
+          {"baked_triangles", f.baked_triangles},
+          {"baked_vertices", f.baked_vertices},
+          {"progressive_bytes", f.progressive_bytes},
+          {"certificate", f.levels.empty() ? nullptr : field_certificate_object(f.levels.front().certificate)},
+          {"levels", levels}};
 }
 
 ordered_json glossy_object(const GlossyReport& g) {

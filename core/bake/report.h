@@ -9,7 +9,7 @@
 #include "core/bake/certificate.h"
 #include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_outcome.h"
-#include "core/bake/light_field_certificate.h"
+#include "core/bake/light_field_stage.h"
 #include "core/bake/links_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/progressive.h"
@@ -22,14 +22,6 @@ struct GlossyReport {
   std::size_t vertices = 0, rank = 0;
   double compression = 0, noise = 0;  // as GlossyBaked
   std::optional<GlossyCertificate> certificate;
-};
-
-/// What is known of the light field, where there is one.
-struct FieldReport {
-  int degree = 0;
-  double noise = 0;      // as OutgoingLight
-  std::size_t rank = 0;  // of the stored components
-  std::optional<FieldCertificate> certificate;
 };
 
 /// Everything a report is made from.
@@ -47,7 +39,7 @@ struct ReportInput {
   const std::optional<ErrorSources>& sources;
   const std::optional<GridOutcome>& grid;
   const std::optional<LinksOutcome>& links;
-  const std::optional<FieldReport>& field;
+  const std::optional<FieldOutcome>& field;
   const std::optional<GlossyReport>& glossy;
   const Passes& passes;  // none where a quality was asked for
 };

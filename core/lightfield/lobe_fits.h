@@ -8,7 +8,7 @@
 //         about the plane of w, so that its fit over azimuth 0 has only m >= 0, and turns with w.
 // Diffuse 1 - E(n.v): what a specular layer of F0 = .04 leaves to the diffuse one below (lobe_table.h).
 // Paper   Vanhoey et al. 2013 (regularised fits), 2015 section 7 (prolongation below the horizon).
-// Error   a hundredth more than that of the best series over the half space alone (measured by its test)
+// Error   at most three hundredths more than that of the best series over the half space alone (measured by its test)
 // Cost    7 million evaluations of Y at degree 4, once: 1 s of one core
 
 #include <cstddef>

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/base/expects.h"
+#include "core/lightfield/hemisphere_norm.h"
 #include "core/lightfield/lobe_fits.h"
 #include "core/prt/direction_sets.h"
 #include "core/prt/ray_origin.h"
@@ -110,6 +111,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
   const LobeFits fits(params.degree, threads);
+  const HemisphereNorm norm(params.degree);
   const Gather gather(world, params);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
@@ -135,16 +137,17 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
       halves.sums[1].finish(material.f0, below, 2, half);
       const Basis<float> basis = basis_around(points[v].normal);
       constexpr double kWhite = 3.5449077018110318;  // 2 sqrt(pi): coefficient of a constant 1
+      std::vector<double> off(numbers);
+      for (std::size_t k = 0; k < numbers; ++k) {
+        off[k] = 0.5 * (double{all[k]} - double{half[k]});
+        all[k] = 0.5F * (all[k] + half[k]);
+      }
+      noise[v] = squared_norm(norm, {0, 0, 1}, off) / 3;
       for (std::size_t c = 0; c < 3; ++c) {
-        const std::size_t first = c * out.field.count();
-        for (std::size_t k = first; k < first + out.field.count(); ++k) {
-          const double off = 0.5 * (double{all[k]} - double{half[k]});
-          noise[v] += off * off / (4 * std::numbers::pi * 3);
-          all[k] = 0.5F * (all[k] + half[k]);
-        }
-        rotate_sh(params.degree + 1, basis, &all[first], &all[first]);
-        all[first] += material.emission[c] * static_cast<float>(kWhite);
-        mean[v] += double{all[first]} / (kWhite * 3);
+        float* series = &all[c * out.field.count()];
+        rotate_sh(params.degree + 1, basis, series, series);
+        series[0] += material.emission[c] * static_cast<float>(kWhite);
+        mean[v] += double{series[0]} / (kWhite * 3);
       }
     }
     rays += own;

@@ -4,18 +4,43 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
+namespace {
+
+constexpr int kBrightSets = 64;
+
+}  // namespace
 
 IncidentLight::IncidentLight(const World& world, const Rays& own, std::uint64_t seed)
     : world_(world), own_(own), seed_(seed), emitters_(world.tracer.scene()) {
   if (!own.direct || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
   if (sampler.useful()) bright_ = std::move(sampler);
+  draw_bright_rays();
   if (own.blurred && bright_) blurred_ = blurred_sky();
+}
+
+void IncidentLight::draw_bright_rays() {
+  if (!bright_) return;
+  const int half = (own_.count + 1) / 2;
+  for (int set = 0; set < kBrightSets; ++set) {
+    std::vector<std::pair<std::uint32_t, BrightRay>> rays;  // by half, and along a curve: packets are narrow
+    for (int k = 0; k < own_.count; ++k) {
+      const Vec2f u =
+          sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ 0x736b79ULL ^ static_cast<unsigned>(set)));
+      const Vec3d w = bright_->sample({u.x, u.y});
+      const double share = 1 / (own_.count * (own_.density + bright_->density(w)));
+      const Vec3f light = environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share);
+      rays.push_back({morton_code(u) >> 1 | (k < half ? 0U : 1U << 31), {to_float(w), light, place_of(k)}});
+    }
+    std::ranges::stable_sort(rays, {}, [](const auto& ray) { return ray.first; });
+    for (const auto& ray : rays) bright_rays_.push_back(ray.second);
+  }
 }
 
 /// The sky as rays see it, at a resolution of one texel for each.
@@ -92,14 +117,23 @@ void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, cons
 void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                      const Visit& visit) const {
   if (!bright_) return;
-  for (int k = 0; k < own_.count; ++k) {
-    const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(seed_ ^ mix64(item ^ 0x736b79ULL)));
-    const Vec3d w = bright_->sample({u.x, u.y});
-    if (world_.tracer.occluded(place, to_float(w), kFar)) continue;
-    const double share = 1 / (own_.count * (own_.density + bright_->density(w)));
-    visit(to_float(w), environment_radiance(*world_.sky, to_float(w)) * static_cast<float>(share), place_of(k));
+  const auto count = static_cast<std::size_t>(own_.count);
+  const BrightRay* set = &bright_rays_[count * (mix64(seed_ ^ mix64(item ^ 0x736b79ULL)) % kBrightSets)];
+  Rays16 packet;
+  packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z), packet.far.fill(kFar);
+  for (std::size_t first = 0; first < count; first += kPacket) {
+    const std::size_t n = std::min<std::size_t>(kPacket, count - first);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3f& w = set[first + i].w;
+      packet.dx[i] = w.x, packet.dy[i] = w.y, packet.dz[i] = w.z;
+    }
+    const std::uint32_t hidden = world_.tracer.occluded16(packet, static_cast<int>(n));
+    for (std::size_t i = 0; i < n; ++i) {
+      const BrightRay& ray = set[first + i];
+      if ((hidden >> i & 1U) == 0) visit(ray.w, ray.light, ray.place);
+    }
   }
-  rays += static_cast<std::uint64_t>(own_.count);
+  rays += count;
 }
 
 void IncidentLight::visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,

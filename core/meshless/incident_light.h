@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "core/base/random.h"
 #include "core/meshless/lit_surface.h"
@@ -55,8 +56,14 @@ class IncidentLight {
   void visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
 
  private:
+  /// A sample of the sky's bright part, and what it brings where nothing is in its way.
+  struct BrightRay {
+    Vec3f w, light;
+    float place = 0;  // of Visit
+  };
   Vec3f balanced_sky(const Vec3f& w) const;
   Environment blurred_sky() const;
+  void draw_bright_rays();
   Vec3f seen_sky(const Vec3f& w) const;
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
   void visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit&) const;
@@ -70,6 +77,7 @@ class IncidentLight {
   std::uint64_t seed_;
   EmitterSampler emitters_;
   std::optional<EnvironmentSampler> bright_;  // of a map that has brighter and darker parts
+  std::vector<BrightRay> bright_rays_;        // kBrightSets sets of own_.count rays; a place takes one by hash
   std::optional<Environment> blurred_;        // what rays see of the sky, averaged
 };
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/mesh/mesh.h"
-#include "core/reduce/quadric.h"
+#include "core/mesh/quadric.h"
 
 namespace kiln {
 

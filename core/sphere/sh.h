@@ -4,6 +4,7 @@
 //   Y(0,0) = 0.282095, Y(1,-1) = 0.488603 y, Y(1,0) = 0.488603 z, Y(1,1) = 0.488603 x;  index i = l(l+1)+m.
 //   "Order n" means bands 0..n-1: n*n coefficients.
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,11 @@ void evaluate_sh(int order, const Vec3d& w, double* out);
 /// if f_world(w) = f_local(basis.to_local(w)) then world = rotate(local). Exact within rounding for any order.
 /// Cost about 0.3 us at order 6.  `in` and `out` hold order*order values and may be the same array.
 void rotate_sh(int order, const Basis<float>& basis, const float* in, float* out);
+void rotate_sh(int order, const Basis<double>& basis, const double* in, double* out);
+
+/// Turns functions given in world axes into a frame whose z axis is `n` (unit); where its x axis points is not said.
+/// Coefficient i of function k is c[i * columns + k]. Half the cost of rotate_sh, and less with many columns.
+void turn_sh_upright(int order, const Vec3d& n, std::size_t columns, double* c);
 
 /// The transfer vector of an unoccluded white Lambertian point with normal n: 1/pi times the clamped cosine,
 ///   t_lm = A_l / pi * Y_lm(n),   A_l of Ramamoorthi and Hanrahan 2001.   t(n) . L(constant 1) = 1.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "core/base/expects.h"
@@ -16,10 +17,15 @@ namespace {
 
 constexpr int kMax = sh_count(kMaxShOrder);
 
+// Numbers of columns that the compiler knows.
+using One = std::integral_constant<std::size_t, 1>;
+using Block = std::integral_constant<std::size_t, 6>;  // two functions of R, G and B
+
 /// The non-zero entries of J, row by row.
+template <class T>
 struct SwapMatrix {
   struct Entry {
-    float value;
+    T value;
     std::int32_t column;
   };
   std::vector<Entry> entries;
@@ -31,7 +37,7 @@ struct SwapMatrix {
       for (int column = 0; column < kMax; ++column) {
         const double value = dense[static_cast<std::size_t>(row * kMax + column)];
         // Non-zero entries of the bands up to 9 are above 1e-3; the quadrature leaves 1e-15 of the others.
-        if (std::abs(value) > 1e-9) entries.push_back({static_cast<float>(value), column});
+        if (std::abs(value) > 1e-9) entries.push_back({static_cast<T>(value), column});
       }
       row_end[static_cast<std::size_t>(row) + 1] = static_cast<std::int32_t>(entries.size());
     }
@@ -52,19 +58,25 @@ struct SwapMatrix {
   }
 };
 
-const SwapMatrix& swap_matrix() {
-  static const SwapMatrix matrix;
+template <class T>
+const SwapMatrix<T>& swap_matrix() {
+  static const SwapMatrix<T> matrix;
   return matrix;
 }
 
-void swap_y_z(int order, const float* in, float* out) {
-  const SwapMatrix& matrix = swap_matrix();
-  const SwapMatrix::Entry* entry = matrix.entries.data();
-  for (int row = 0; row < sh_count(order); ++row) {
-    const SwapMatrix::Entry* end = matrix.entries.data() + matrix.row_end[static_cast<std::size_t>(row) + 1];
-    float sum = 0;
-    for (; entry != end; ++entry) sum += entry->value * in[entry->column];
-    out[row] = sum;
+/// Of functions side by side: coefficient i of function k is in[i * columns + k].
+template <class T, class Columns>
+void swap_y_z(int order, Columns columns, const T* in, T* out) {
+  const SwapMatrix<T>& matrix = swap_matrix<T>();
+  const auto* entry = matrix.entries.data();
+  for (int row = 0; row < sh_count(order); ++row, out += columns) {
+    const auto* end = matrix.entries.data() + matrix.row_end[static_cast<std::size_t>(row) + 1];
+    std::array<T, Columns{}> sum{};
+    for (; entry != end; ++entry) {
+      const T* from = in + static_cast<std::size_t>(entry->column) * columns;
+      for (std::size_t k = 0; k < columns; ++k) sum[k] += entry->value * from[k];
+    }
+    std::copy(sum.begin(), sum.end(), out);
   }
 }
 
@@ -78,28 +90,30 @@ Turn turn_towards(double x, double y) {
   return norm > 0 ? Turn{x / norm, y / norm} : Turn{};
 }
 
-void turn_about_z(int order, const Turn& turn, float* c) {
+template <class T, class Columns>
+void turn_about_z(int order, const Turn& turn, Columns columns, T* c) {
   double cosine = 1, sine = 0;  // of m times the angle
   for (int m = 1; m < order; ++m) {
     const double next = cosine * turn.cosine - sine * turn.sine;
     sine = sine * turn.cosine + cosine * turn.sine;
     cosine = next;
-    const auto cm = static_cast<float>(cosine), sm = static_cast<float>(sine);
+    const auto cm = static_cast<T>(cosine), sm = static_cast<T>(sine);
     for (int l = m; l < order; ++l) {
-      float& plus = c[l * (l + 1) + m];
-      float& minus = c[l * (l + 1) - m];
-      const float p = plus, q = minus;
-      plus = p * cm - q * sm;
-      minus = p * sm + q * cm;
+      T* plus = c + static_cast<std::size_t>(l * (l + 1) + m) * columns;
+      T* minus = c + static_cast<std::size_t>(l * (l + 1) - m) * columns;
+      for (std::size_t k = 0; k < columns; ++k) {
+        const T p = plus[k], q = minus[k];
+        plus[k] = p * cm - q * sm;
+        minus[k] = p * sm + q * cm;
+      }
     }
   }
 }
 
-}  // namespace
-
-void rotate_sh(int order, const Basis<float>& basis, const float* in, float* out) {
+template <class T>
+void rotate(int order, const Basis<T>& basis, const T* in, T* out) {
   EXPECTS(order >= 1 && order <= kMaxShOrder);
-  const Vec3d x = to_double(basis.x), z = to_double(basis.z);
+  const Vec3d x{basis.x.x, basis.x.y, basis.x.z}, z{basis.z.x, basis.z.y, basis.z.z};
   const Turn alpha = turn_towards(z.x, z.y);
   const double sin_beta = z.x * alpha.cosine + z.y * alpha.sine;
   const Turn beta = turn_towards(z.z, sin_beta);
@@ -107,13 +121,37 @@ void rotate_sh(int order, const Basis<float>& basis, const float* in, float* out
   const double along = x.x * alpha.cosine + x.y * alpha.sine;
   const Turn gamma = turn_towards(beta.cosine * along - beta.sine * x.z, x.y * alpha.cosine - x.x * alpha.sine);
 
-  std::array<float, kMax> a, b;
+  std::array<T, kMax> a, b;
   std::copy(in, in + sh_count(order), a.begin());
-  turn_about_z(order, gamma, a.data());
-  swap_y_z(order, a.data(), b.data());
-  turn_about_z(order, {beta.cosine, -beta.sine}, b.data());
-  swap_y_z(order, b.data(), out);
-  turn_about_z(order, alpha, out);
+  turn_about_z(order, gamma, One{}, a.data());
+  swap_y_z(order, One{}, a.data(), b.data());
+  turn_about_z(order, {beta.cosine, -beta.sine}, One{}, b.data());
+  swap_y_z(order, One{}, b.data(), out);
+  turn_about_z(order, alpha, One{}, out);
+}
+
+}  // namespace
+
+void rotate_sh(int order, const Basis<float>& basis, const float* in, float* out) { rotate(order, basis, in, out); }
+void rotate_sh(int order, const Basis<double>& basis, const double* in, double* out) { rotate(order, basis, in, out); }
+
+void turn_sh_upright(int order, const Vec3d& n, std::size_t columns, double* c) {
+  EXPECTS(order >= 1 && order <= kMaxShOrder);
+  const Turn alpha = turn_towards(n.x, n.y);
+  const Turn beta = turn_towards(n.z, n.x * alpha.cosine + n.y * alpha.sine);
+  const auto count = static_cast<std::size_t>(sh_count(order));
+  std::array<double, kMax * Block{}> a, b;
+  for (std::size_t first = 0; first < columns; first += Block{}) {
+    const std::size_t used = std::min<std::size_t>(Block{}, columns - first);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t k = 0; k < Block{}; ++k) a[i * Block{} + k] = k < used ? c[i * columns + first + k] : 0;
+    turn_about_z(order, {alpha.cosine, -alpha.sine}, Block{}, a.data());
+    swap_y_z(order, Block{}, a.data(), b.data());
+    turn_about_z(order, beta, Block{}, b.data());
+    swap_y_z(order, Block{}, b.data(), a.data());
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t k = 0; k < used; ++k) c[i * columns + first + k] = a[i * Block{} + k];
+  }
 }
 
 }  // namespace kiln

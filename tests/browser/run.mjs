@@ -7,7 +7,7 @@ import { whatIsMissing } from './browser.mjs';
 
 const [file] = process.argv.slice(2);
 const here = fileURLToPath(new URL('.', import.meta.url));
-const needsBrowser = !['light.test.mjs', 'unpack.test.mjs', 'types.test.mjs'].includes(file);
+const needsBrowser = !['light.test.mjs', 'unpack.test.mjs', 'types.test.mjs', 'progressive.test.mjs'].includes(file);
 const packages = existsSync(`${here}../../web_viewer/node_modules/vite`);
 const noServer = file === 'server.test.mjs' && !existsSync(process.env.KILND ?? '') ? 'kilnd is not built' : null;
 const missing =

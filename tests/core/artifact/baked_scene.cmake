@@ -7,7 +7,7 @@ kiln_flags(kiln-make-sample)
 target_link_libraries(kiln-make-sample PRIVATE kiln_sample_scene)
 
 kiln_test(baked_scene_test
-  SOURCES round_trip_test.cpp baked_shape_test.cpp look_json_test.cpp look_test.cpp png_test.cpp damaged_glb_test.cpp components_glb_test.cpp glossy_glb_test.cpp grid_exr_test.cpp links_glb_test.cpp
+  SOURCES round_trip_test.cpp baked_shape_test.cpp look_json_test.cpp look_test.cpp png_test.cpp damaged_glb_test.cpp components_glb_test.cpp glossy_glb_test.cpp grid_exr_test.cpp light_field_glb_test.cpp links_glb_test.cpp
   LINKS kiln_sample_scene nlohmann_json::nlohmann_json)
 set_source_files_properties(png_test.cpp PROPERTIES INCLUDE_DIRECTORIES /usr/include/stb)
 

@@ -1,4 +1,4 @@
-#include "core/reduce/quadric.h"
+#include "core/mesh/quadric.h"
 
 #include <gtest/gtest.h>
 

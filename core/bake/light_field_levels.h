@@ -1,0 +1,32 @@
+#pragma once
+// The levels of detail of a light field: the delivered scene, simplified as far as its light allows or as the recipe
+// asks, and coarser ones that follow from it. Every level is simplified further from the one before it.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/artifact/baked_scene.h"
+#include "core/bake/bake_log.h"
+#include "core/bake/plan.h"
+#include "core/base/threads.h"
+#include "core/lightfield/simplify.h"
+
+namespace kiln {
+
+struct FieldLevel {
+  Mesh mesh;
+  LightField field;
+  Transfer transfer;    // diffuse light of its vertices, read from the nearest place of the baked surface
+  double estimate = 0;  // of what simplification added, of all steps up to here
+  bool reached = true;  // the asked number of triangles
+};
+
+struct FieldLevels {
+  std::vector<FieldLevel> levels;         // the first is the delivered scene
+  std::vector<std::uint8_t> progressive;  // bytes of KILN_progressive_mesh from the last level to the first, if asked
+};
+
+/// From the scene as it was baked, its transfer of order 0 and its field.
+FieldLevels make_levels(const Mesh&, const Transfer&, LightField, const FieldPlan&, BakeLog&, Threads&);
+
+}  // namespace kiln

@@ -1,0 +1,64 @@
+#pragma once
+// What becomes of a baked light field: levels of detail, files, certificates.
+// The delivered scene is simplified (light_field_levels.h); truth stays that of the surface as it was baked.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/artifact/baked_scene.h"
+#include "core/bake/bake_log.h"
+#include "core/bake/light_field_certificate.h"
+#include "core/bake/light_field_levels.h"
+#include "core/bake/plan.h"
+#include "core/bake/recipe.h"
+#include "core/lightfield/outgoing.h"
+
+namespace kiln {
+
+struct FieldLevelReport {
+  std::string file;
+  std::size_t triangles = 0, vertices = 0;
+  std::uint64_t bytes = 0;
+  double estimate = 0;  // as FieldLevel
+  bool reached = true;
+  std::optional<FieldCertificate> certificate;
+};
+
+struct FieldOutcome {
+  int degree = 0;
+  double noise = 0;  // as OutgoingLight
+  std::size_t rank = 0, baked_triangles = 0, baked_vertices = 0;
+  std::uint64_t progressive_bytes = 0;   // of KILN_progressive_mesh, 0 where it was not asked for
+  std::vector<FieldLevelReport> levels;  // scene.glb, then lod1.glb and on
+  std::vector<Bytes> lods;               // the files of the latter
+};
+
+class LightFieldStage {
+ public:
+  /// Puts the first level into `baked`.
+  LightFieldStage(BakedScene& baked, OutgoingLight, Plan&, BakeLog&, Threads&);
+
+  /// Of the first level (choose_field_encoding).
+  const TransferEncoding& encoding() const { return encoding_; }
+  /// The scene as it was baked; once.
+  Scene take_surface() { return std::move(surface_); }
+
+  struct Job {
+    const Scene& surface;  // what take_surface gave
+    const std::optional<Environment>& environment;
+    const Recipe& recipe;
+  };
+  /// Adds the progressive mesh to the file whose vertices are those of `decoded`, writes the other levels and certifies
+  /// them all.
+  Result<FieldOutcome> finish(Bytes& glb, const BakedScene& decoded, const Job&, BakeLog&, Threads&);
+
+ private:
+  Plan& plan_;
+  Scene surface_;
+  FieldLevels levels_;
+  TransferEncoding encoding_;
+  FieldOutcome outcome_;
+};
+
+}  // namespace kiln

@@ -1,0 +1,180 @@
+#include "core/lightfield/collapse_cost.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/lightfield/radiance_function.h"
+#include "core/mesh/topology.h"
+
+namespace kiln {
+namespace {
+
+// Of the diagonal. So that at the default weight neither light nor shape is paid for with the other: README.md.
+constexpr double kLengthUnit = 0.005;
+constexpr double kEvenness = 1e-9;  // of squared edge length beside Q: flat regions collapse short edges first
+
+double squared_diagonal(const std::vector<Vec3f>& position) {
+  if (position.empty()) return 1;
+  Vec3f low = position[0], high = low;
+  for (const Vec3f& p : position) {
+    for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], p[a]), high[a] = std::max(high[a], p[a]);
+  }
+  const Vec3d across = to_double(high) - to_double(low);
+  return dot(across, across) > 0 ? dot(across, across) : 1;
+}
+
+/// Column 3 i + c: channel c of neighbour i, minus that of v.
+std::vector<double> differences(const LightField& field, std::uint32_t v, const std::vector<std::uint32_t>& ring) {
+  const std::size_t count = field.count(), columns = 3 * ring.size();
+  std::vector<double> out(count * columns);
+  const float* own = field.of(v).data();
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const float* other = field.of(ring[i]).data();
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t k = 0; k < count; ++k)
+        out[k * columns + 3 * i + c] = static_cast<double>(other[c * count + k]) - own[c * count + k];
+  }
+  return out;
+}
+
+}  // namespace
+
+CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Collapse how)
+    : mesh_(mesh), norm_(mesh.lit().field.degree), how_(how) {
+  const LitMesh& lit = mesh.lit();
+  const double area = surface_area(lit.mesh);
+  double light = 0;
+  for (const Triangle& t : lit.mesh.triangles) {
+    const double share = triangle_area(lit.mesh, t) / 3;
+    for (const std::uint32_t v : t) {
+      const auto c = lit.field.of(v);
+      const std::vector<double> rgb(c.begin(), c.end());
+      light += share * squared_norm(norm_, normalized(to_double(lit.mesh.normal[v])), rgb);
+    }
+  }
+  if (area > 0) {
+    const double unit = kLengthUnit * kLengthUnit * squared_diagonal(lit.mesh.position);
+    geometry_ = geometry_weight / (unit * area);
+    even_ = kEvenness / (unit * area);
+    light_ = light > 0 ? (1 - geometry_weight) / light : 0;  // mean |L|^2 is light / area
+  }
+  quadric_.resize(mesh.points()), area_.resize(mesh.points()), gram_.resize(lit.mesh.position.size());
+}
+
+void CollapseCost::update_point(std::uint32_t p) {
+  Quadric q;
+  double area = 0;
+  const Vec3d at = mesh_.position(p);
+  std::vector<std::uint32_t> neighbours;
+  mesh_.around_point(p, [&](std::uint32_t, std::uint32_t, std::uint32_t a, std::uint32_t b) {
+    const Vec3d pa = to_double(mesh_.mesh().position[a]), pb = to_double(mesh_.mesh().position[b]);
+    const Vec3d across = cross(pa - at, pb - at);
+    const double area2 = length(across);
+    area += 0.5 * area2;
+    if (area2 > 0) q.add_plane(across / area2, dot(across, at) / area2, 0.5 * area2);
+    for (const std::uint32_t x : {mesh_.point(a), mesh_.point(b)})
+      if (std::ranges::find(neighbours, x) == neighbours.end()) neighbours.push_back(x);
+  });
+  if (mesh_.kind(p) != PointKind::free) {
+    for (const std::uint32_t x : neighbours) {
+      if (mesh_.kind(x) == PointKind::free) continue;
+      const Vec3d other = mesh_.position(x);
+      const EdgeSides sides = mesh_.sides(p, x);
+      const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
+      if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
+    }
+  }
+  quadric_[p] = q, area_[p] = area;
+}
+
+void CollapseCost::update_vertex(std::uint32_t v) {
+  Gram& g = gram_[v];
+  g.ring.clear();
+  mesh_.around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
+    for (const std::uint32_t x : {a, b})
+      if (std::ranges::find(g.ring, x) == g.ring.end()) g.ring.push_back(x);
+  });
+  std::vector<double> columns = differences(mesh_.lit().field, v, g.ring);
+  norm_.products(normalized(to_double(mesh_.mesh().normal[v])), g.ring.size(), columns, g.product);
+}
+
+double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const {
+  const Gram& g = gram_[v];
+  const auto index = [&](std::uint32_t x) {
+    return static_cast<std::size_t>(std::ranges::find(g.ring, x) - g.ring.begin());
+  };
+  const auto product = [&](std::size_t i, std::size_t k) -> double {
+    return g.product[i > k ? i * (i + 1) / 2 + k : k * (k + 1) / 2 + i];
+  };
+  const auto& position = mesh_.mesh().position;
+  const Vec3d at = to_double(position[v]);
+  const bool partner = w != SurfacePoints::kNone;
+  const std::size_t iw = partner ? index(w) : 0;
+  double sum = 0;
+  mesh_.around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
+    if (a == w || b == w) return;
+    const std::array<Vec3d, 3> t{place, to_double(position[a]), to_double(position[b])};
+    const double area = 0.5 * length(cross(t[1] - t[0], t[2] - t[0]));
+    const Vec3d weights = foot_barycentrics(t, at);
+    const std::size_t i[] = {iw, index(a), index(b)};
+    const double x[] = {partner ? share * weights.x : 0, weights.y, weights.z};
+    double squared = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      squared += x[k] * x[k] * product(i[k], i[k]);
+      for (std::size_t j = 0; j < k; ++j) squared += 2 * x[k] * x[j] * product(i[k], i[j]);
+    }
+    sum += area * std::max(0.0, squared);  // eq. 7
+  });
+  return sum;
+}
+
+void CollapseCost::find_cost(CollapsePlan& plan) const {
+  const Vec3d place = to_double(plan.place), edge = mesh_.position(plan.kept) - mesh_.position(plan.gone);
+  const Quadric q = quadric_[plan.gone] + quadric_[plan.kept];
+  double light = 0;
+  if (light_ > 0) {
+    for (std::uint32_t i = 0; i < plan.sides.pairs; ++i) {
+      const std::uint32_t v = plan.sides.from[i], w = plan.sides.to[i];
+      light += light_error(v, w, plan.share, place);
+      if (plan.moves) light += light_error(w, v, 1 - plan.share, place);
+    }
+    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+      if (!plan.sides.goes(v)) light += light_error(v, SurfacePoints::kNone, 0, place);
+    });
+    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+      if (plan.moves && !plan.sides.takes(w)) light += light_error(w, SurfacePoints::kNone, 0, place);
+    });
+  }
+  plan.cost = geometry_ * q.at(place) + light_ * light;
+  plan.order = plan.cost + even_ * (area_[plan.gone] + area_[plan.kept]) * dot(edge, edge);
+}
+
+CollapsePlan CollapseCost::plan(std::uint32_t p, std::uint32_t q) const {
+  CollapsePlan best;
+  const auto consider = [&](CollapsePlan plan) {
+    plan.possible = true;
+    find_cost(plan);
+    if (!best.possible || plan.order < best.order) best = plan;
+  };
+  for (const auto& [gone, kept] :
+       {std::pair(std::max(p, q), std::min(p, q)), std::pair(std::min(p, q), std::max(p, q))}) {
+    const EdgeSides sides = mesh_.sides(gone, kept);
+    const auto allowed = mesh_.allowed(gone, kept, sides);
+    if (allowed.at_kept)
+      consider({.gone = gone, .kept = kept, .place = to_float(mesh_.position(kept)), .sides = sides});
+    if (how_ == Collapse::half_edge || !allowed.elsewhere || gone < kept) continue;  // the other way round is the same
+    const Vec3d from = mesh_.position(gone), edge = mesh_.position(kept) - from, middle = from + edge * 0.5;
+    const Vec3d least = least_point(quadric_[gone] + quadric_[kept], middle);
+    if (!(dot(edge, edge) > 0) || length(least - middle) > 2 * length(edge)) continue;
+    const double share = std::clamp(dot(least - from, edge) / dot(edge, edge), 0.0, 1.0);  // section 4.3
+    consider({.gone = gone,
+              .kept = kept,
+              .place = to_float(least),
+              .share = static_cast<float>(share),
+              .moves = true,
+              .sides = sides});
+  }
+  return best;
+}
+
+}  // namespace kiln

@@ -1,0 +1,201 @@
+// Bytes of a progressive mesh. README.md specifies them.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "core/base/expects.h"
+#include "core/lightfield/progressive_mesh.h"
+
+namespace kiln {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the bytes are little endian");
+static_assert(sizeof(Vec3f) == 12 && sizeof(Vec2f) == 8 && sizeof(Vec4f) == 16 && sizeof(Triangle) == 12);
+
+constexpr std::uint32_t kMagic = 0x4D504B31;  // "1KPM"
+constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16;
+
+struct Header {
+  std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
+                splits = 0, turned = 0, moved = 0;
+};
+
+/// Of a split, as stored: counts are vertices | triangles << 3 | pairs << 5 | moved << 7.
+struct StoredSplit {
+  std::uint32_t counts = 0, turned = 0, parent[2] = {};
+  float error = 0;
+};
+constexpr std::uint32_t kMostMoved = 0x1ffffff, kMostVertices = 6;
+
+std::uint32_t attributes_of(const Mesh& m) {
+  return (m.uv0.empty() ? 0 : kHasUv0) | (m.uv1.empty() ? 0 : kHasUv1) | (m.color.empty() ? 0 : kHasColor) |
+         (m.tangent.empty() ? 0 : kHasTangent) | (m.part.empty() ? 0 : kHasPart);
+}
+
+/// Calls visit(array, elements) for every array of the file in its order.
+template <class Progressive, class Splits, class Visit>
+void each_array(Progressive& p, Splits& splits, const Header& h, const Visit& visit) {
+  const auto vertices_of = [&](auto& lit, std::size_t count) {
+    visit(lit.mesh.position, count);
+    visit(lit.mesh.normal, count);
+    if (h.has & kHasUv0) visit(lit.mesh.uv0, count);
+    if (h.has & kHasUv1) visit(lit.mesh.uv1, count);
+    if (h.has & kHasColor) visit(lit.mesh.color, count);
+    if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
+    visit(lit.field.coefficients, 3 * count * static_cast<std::size_t>(sh_count(static_cast<int>(h.degree) + 1)));
+  };
+  vertices_of(p.all, h.vertices);
+  visit(p.all.mesh.triangles, h.triangles);
+  if (h.has & kHasPart) visit(p.all.mesh.part, h.triangles);
+  visit(splits, h.splits);
+  visit(p.turned, h.turned);
+  visit(p.moved_vertex, h.moved);
+  vertices_of(p.moved, h.moved);
+}
+
+tl::unexpected<Fault> bad_index(const std::string& what, const std::string& where) {
+  return fault("index_out_of_range", what, where);
+}
+
+bool all_finite(const LitMesh& lit) {
+  bool finite = true;
+  const auto check = [&](const auto& array) {
+    const auto* first = reinterpret_cast<const float*>(array.data());
+    const std::size_t count = array.size() * sizeof array[0] / sizeof(float);
+    finite = finite && std::all_of(first, first + count, [](float x) { return std::isfinite(x); });
+  };
+  each_attribute(lit.mesh, check);
+  check(lit.field.coefficients);
+  return finite;
+}
+
+/// Follows the splits and checks each against the mesh of its level.
+Result<bool> check_splits(const ProgressiveMesh& p) {
+  std::vector<Triangle> corners = p.all.mesh.triangles;
+  std::uint64_t vertices = p.base_vertices, triangles = p.base_triangles, turned = 0, rows = 0;
+  const auto check_triangles = [&](std::uint64_t begin, const std::string& where) -> Result<bool> {
+    for (std::uint64_t t = begin; t < triangles; ++t) {
+      const auto& [a, b, c] = corners[t];
+      if (std::max({a, b, c}) >= vertices || a == b || b == c || c == a)
+        return bad_index("A triangle has no three corners among the vertices of its level.",
+                         where + " triangle " + std::to_string(t));
+    }
+    return true;
+  };
+  KILN_TRY(base, check_triangles(0, "base"));
+  float error = HUGE_VALF;
+  for (std::size_t s = 0; s < p.splits.size(); ++s) {
+    const VertexSplit& split = p.splits[s];
+    const std::string where = "split " + std::to_string(s);
+    if (split.pairs < 1 || split.pairs > 2 || split.vertices < split.pairs || split.vertices > kMostVertices ||
+        split.triangles < 1 || split.triangles > 2)
+      return fault("slot_count_mismatch", "A split brings too few or too many vertices or triangles.", where);
+    if (!(split.error >= 0 && split.error <= error))
+      return fault("number_out_of_range", "An error is not a number that falls from level to level.", where);
+    error = split.error;
+    for (std::uint32_t i = 0; i < split.pairs; ++i)
+      if (split.parent[i] >= vertices + split.vertices) return bad_index("A parent is not there yet.", where);
+    if (turned + split.turned > p.turned.size() || rows + split.moved > p.moved_vertex.size() ||
+        vertices + split.vertices > p.all.mesh.position.size() || triangles + split.triangles > corners.size())
+      return fault("slot_count_mismatch",
+                   "There are fewer vertices, triangles, corners or moved vertices than splits need.", where);
+    for (std::uint32_t k = 0; k < split.moved; ++k, ++rows)
+      if (p.moved_vertex[rows] >= vertices + split.vertices)
+        return bad_index("A moved vertex is not there yet.", where);
+    for (std::uint32_t k = 0; k < split.turned; ++k, ++turned) {
+      const std::uint32_t triangle = p.turned[turned] / 2, i = p.turned[turned] % 2;
+      if (i >= split.pairs || triangle >= triangles) return bad_index("A turned corner is not there.", where);
+      const auto corner = std::ranges::find(corners[triangle], split.parent[i]);
+      if (corner == corners[triangle].end()) return bad_index("A turned triangle has no corner at the parent.", where);
+      *corner = static_cast<std::uint32_t>(vertices) + i;
+    }
+
+    const std::uint64_t begin = triangles;
+    vertices += split.vertices, triangles += split.triangles;
+    KILN_TRY(fine, check_triangles(begin, where));
+    (void)fine;
+  }
+  (void)base;
+  if (vertices != p.all.mesh.position.size() || triangles != corners.size() || turned != p.turned.size() ||
+      rows != p.moved.mesh.position.size())
+    return fault("slot_count_mismatch", "There are more vertices, triangles, turned corners or moved rows than used.",
+                 "header");
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
+  const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
+  Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
+           .has = attributes_of(p.all.mesh),
+           .base_vertices = p.base_vertices,
+           .base_triangles = p.base_triangles,
+           .vertices = size(p.all.mesh.position),
+           .triangles = size(p.all.mesh.triangles),
+           .splits = size(p.splits),
+           .turned = size(p.turned),
+           .moved = size(p.moved.mesh.position)};
+  std::vector<StoredSplit> splits;
+  splits.reserve(p.splits.size());
+  for (const VertexSplit& s : p.splits) {
+    EXPECTS(s.moved <= kMostMoved);
+    splits.push_back(
+        {s.vertices | s.triangles << 3 | s.pairs << 5 | s.moved << 7, s.turned, {s.parent[0], s.parent[1]}, s.error});
+  }
+  std::vector<std::uint8_t> out;
+  const auto put = [&](const void* data, std::size_t bytes) {
+    const auto* first = static_cast<const std::uint8_t*>(data);
+    out.insert(out.end(), first, first + bytes);
+  };
+  put(&h, sizeof h);
+  each_array(p, splits, h, [&](const auto& array, std::size_t count) {
+    EXPECTS(array.size() == count);
+    put(array.data(), array.size() * sizeof array[0]);
+  });
+  return out;
+}
+
+Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) {
+  Header h;
+  if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
+  std::memcpy(&h, bytes.data(), sizeof h);
+  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 31)
+    return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
+  if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
+    return fault("slot_count_mismatch", "The base is larger than the whole.", "header");
+  ProgressiveMesh p;
+  p.base_vertices = h.base_vertices, p.base_triangles = h.base_triangles;
+  p.all.field.degree = p.moved.field.degree = static_cast<int>(h.degree);
+  std::vector<StoredSplit> splits;
+  std::uint64_t size = sizeof h;  // counts are 32 bits, elements below a kilobyte: no overflow
+  each_array(p, splits, h, [&](const auto& array, std::size_t count) { size += count * sizeof array[0]; });
+  if (size != bytes.size())
+    return fault("truncated",
+                 "There are " + std::to_string(bytes.size()) + " bytes and not " + std::to_string(size) + ".",
+                 "header");
+  std::size_t at = sizeof h;
+  each_array(p, splits, h, [&](auto& array, std::size_t count) {
+    array.resize(count);
+    if (count > 0) std::memcpy(array.data(), bytes.data() + at, count * sizeof array[0]);
+    at += count * sizeof array[0];
+  });
+  for (const StoredSplit& s : splits)
+    p.splits.push_back({.vertices = s.counts & 7,
+                        .triangles = s.counts >> 3 & 3,
+                        .pairs = s.counts >> 5 & 3,
+                        .parent = {s.parent[0], s.parent[1]},
+                        .moved = s.counts >> 7,
+                        .turned = s.turned,
+                        .error = s.error});
+  if (!all_finite(p.all)) return fault("number_out_of_range", "A vertex has a number that is not finite.", "vertices");
+  if (!all_finite(p.moved)) return fault("number_out_of_range", "A row has a number that is not finite.", "moved rows");
+  KILN_TRY(fine, check_splits(p));
+  (void)fine;
+  return p;
+}
+
+}  // namespace kiln

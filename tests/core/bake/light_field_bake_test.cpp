@@ -1,0 +1,91 @@
+// The step `lightfield`, from recipe to certificate.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/artifact/baked_scene.h"
+#include "core/artifact/progressive_glb.h"
+#include "core/lightfield/seen.h"
+#include "tests/core/bake/bake_input.h"
+
+namespace kiln {
+namespace {
+
+using testing::file;
+using testing::input_of;
+using testing::report_of;
+
+BakeOutput baked(const std::string& scene, const std::string& recipe, int count = 0) {
+  Threads threads(count);
+  auto output = bake(input_of(scene, recipe), {}, threads);
+  EXPECT_TRUE(output) << output.error().message;
+  return std::move(*output);
+}
+
+TEST(LightFieldBake, OfADiffuseRoomHoldsItsCertificateAndLevelsGetWorse) {
+  const BakeOutput out = baked("room", R"({"steps":[{"do":"lightfield","degree":3,"rays":128,"lods":2,
+    "subdivide":{"triangles":8000},"progressive":true}],"quality":"draft","environment":{"builtin":"overcast"}})");
+  const nlohmann::json field = report_of(out)["lightfield"];
+  ASSERT_EQ(field["levels"].size(), 3U);
+  double before = 0;
+  std::size_t triangles = 1'000'000;
+  for (const auto& level : field["levels"]) {
+    const double error = level["certificate"]["relrmse"], low = level["certificate"]["interval"][0];
+    std::printf("%s %d triangles %.4f\n", level["file"].get<std::string>().c_str(), level["triangles"].get<int>(),
+                error);
+    EXPECT_GE(error, 0.9 * before);  // by other random points
+    EXPECT_LE(level["triangles"].get<std::size_t>(), triangles);
+    EXPECT_TRUE(level["triangles"].get<std::size_t>() < triangles || !level["reached"].get<bool>());
+    EXPECT_GE(low, 0);
+    before = error;
+    triangles = level["triangles"];
+    const auto decoded = read_baked_glb(file(out, level["file"]));
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(decoded->scene.mesh.triangles.size(), triangles);
+    EXPECT_EQ(decoded->field.vertices(), decoded->scene.mesh.position.size());
+  }
+  EXPECT_LT(field["levels"][0]["certificate"]["relrmse"].get<double>(), 0.06);  // .030 measured
+  const auto progressive = read_progressive(file(out, "scene.glb"));
+  ASSERT_TRUE(progressive) << progressive.error().message;
+  EXPECT_EQ(progressive->all.mesh.triangles.size(), field["levels"][0]["triangles"].get<std::size_t>());
+}
+
+TEST(LightFieldBake, WhatLooksTheSameFromEverywhereIsThatOfRadiosity) {
+  // Roughness 1 and no metal: what the diffuse layer sends, and a faint wide lobe.
+  const char* common = R"(,"subdivide":"off"}],"quality":"draft","environment":{"builtin":"uniform"}})";
+  const BakeOutput field =
+      baked("column", std::string(R"({"steps":[{"do":"lightfield","degree":2,"rays":128,"simplify":"off")") + common);
+  const auto shown = read_baked_glb(file(field, "scene.glb"));
+  ASSERT_TRUE(shown);
+  double field_sum = 0, light_sum = 0;
+  for (std::size_t i = 0; i < shown->scene.mesh.triangles.size(); ++i) {
+    const Triangle& t = shown->scene.mesh.triangles[i];
+    const Vec3d n = to_double(shown->scene.mesh.normal[t[0]]);
+    field_sum += seen_radiance(shown->field, t, 0, 0, n, n).y;
+    const Part& part = shown->scene.parts[shown->scene.mesh.part[i]];
+    const double albedo = shown->scene.materials[static_cast<std::size_t>(part.material)].base_color.y;
+    light_sum += albedo * double{shown->transfer.at(t[0], 0)[1]};
+  }
+  // The specular layer keeps .04 at this angle and sends back most of it.
+  EXPECT_NEAR(field_sum / light_sum, 1, 0.08);
+}
+
+TEST(LightFieldBake, ThreadCountChangesNotOneByteOfTheScene) {
+  const char* recipe = R"({"steps":[{"do":"lightfield","degree":2,"rays":128,"lods":1,"subdivide":{"triangles":3000}}],
+                           "quality":"draft","certificate":false,"environment":{"builtin":"clear"}})";
+  const BakeOutput one = baked("room", recipe, 1), three = baked("room", recipe, 3);
+  EXPECT_EQ(file(one, "scene.glb"), file(three, "scene.glb"));
+  EXPECT_EQ(file(one, "lod1.glb"), file(three, "lod1.glb"));
+}
+
+TEST(LightFieldBake, DarknessIsDarkAndHasNoError) {
+  const BakeOutput out = baked("column", R"({"steps":[{"do":"lightfield","degree":2,"rays":128,"subdivide":"off"}],
+                                             "quality":"draft"})");
+  const nlohmann::json field = report_of(out)["lightfield"];
+  EXPECT_EQ(field["certificate"]["relrmse"], 0.0);
+  EXPECT_EQ(field["noise"], 0.0);
+}
+
+}  // namespace
+}  // namespace kiln
