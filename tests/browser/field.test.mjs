@@ -163,10 +163,23 @@ test('a primitive without its numbers is refused by their name', () => {
   assert.throws(() => unpack(draco, packed), /lacks _SLF_3/);
 });
 
+const certificate = (relrmse) => ({ relrmse, interval: [0.9 * relrmse, 1.2 * relrmse], points: 1013, samples: 64 });
+const kReport = {
+  lightfield: {
+    degree: 4,
+    certificate: certificate(0.05),
+    levels: [
+      { file: 'scene.glb', vertices: 1, triangles: 1, certificate: certificate(0.05) },
+      { file: 'lod1.glb', vertices: 1234, triangles: 2000, certificate: certificate(0.1) },
+      { file: 'lod2.glb', vertices: 123, triangles: 200, certificate: null },
+    ],
+  },
+};
+
 let browser, mock;
 before(async () => {
   browser = await startBrowser();
-  mock = await startMock({ files: { 'scene.glb': file } });
+  mock = await startMock({ files: { 'scene.glb': file, 'report.json': Buffer.from(JSON.stringify(kReport)) } });
   const { artifacts } = mock.jobs.get(jobId('done'));
   for (const name of ['lod2.glb', 'lod1.glb']) artifacts.push({ ...artifacts[0], name, bytes: fixture(name).length });
 });
@@ -310,6 +323,24 @@ test('levels of detail follow the slider, under the same eye, and leave nothing 
     await until(page, () => window.kilnViewer.shown.get().index === 0);
     assert.equal(await vertices(page), finest);
     assert.equal(await memory(page), before);
+  }));
+
+test('the panel tells degree, bytes, and what the report certifies', () =>
+  withField('', async (page) => {
+    const rows = await page.locator('.levels tbody tr').allInnerTexts();
+    const bytes = (name) => `${(fixture(name).length / 1000).toPrecision(3)} kB`;
+    assert.deepEqual(rows.slice(1).map((row) => row.split('\t')), [
+      ['lod1.glb', '1,234', bytes('lod1.glb'), '10.0\u00a0%'],
+      ['lod2.glb', '123', bytes('lod2.glb'), '–'],
+    ]);
+    assert.match(rows[0], /^scene\.glb\t.*\t5\.0\u00a0%$/);
+    await page.getByText('Statistics').click();
+    const text = await page.locator('.statistics').innerText();
+    assert.match(text, /4: 25 × RGB a vertex/);
+    const total = (await vertices(page)) * 16 * texelsOf(4);
+    assert.match(text, new RegExp(`On the graphics card\\s+${(total / 1000).toPrecision(3)} kB`));
+    assert.match(text, /towards random eyes\s+5\.0\u00a0% \(95\u00a0%: 4\.5\u00a0% to 6\.0\u00a0%\)/);
+    assert.match(text, /1,013 points, 64 paths each/);
   }));
 
 const shoulder = (x) => (x <= 0.6 ? x : 1 - 0.4 * Math.exp((0.6 - x) / 0.4));

@@ -85,17 +85,30 @@ export function storedField(e: LightFieldExtension, bytesIn: (view: number) => U
 /// Throws on what is not finite.
 export function fieldTexels(field: StoredTransfer, attributes: readonly Float32Array[]): FieldTexels {
   const degree = field.order - 1;
-  const [stride, width] = [3 * field.slots, 8 * texelsOf(degree)];
-  const places = Array.from({ length: stride }, (_, s) => halfAt(degree, s % field.slots, Math.floor(s / field.slots)));
+  const stride = 3 * field.slots;
   const vertices = attributes[0].length / 4;
-  const halves = new Uint16Array(width * vertices);
-  const unit = 2 ** Math.ceil(Math.log2((largestOf(field) || 1) / kLargestHalf));
+  const out = emptyTexels(degree, vertices, largestOf(field));
+  const write = texelWriter(out);
   for (let first = 0; first < vertices; first += kBatch) {
     const numbers = coefficientsOf(field, attributes.map((all) => all.subarray(4 * first, 4 * (first + kBatch))));
-    for (let from = 0, to = width * first; from < numbers.length; from += stride, to += width)
-      for (let s = 0; s < stride; ++s) halves[to + places[s]] = halfOf(numbers[from + s] / unit);
+    for (let from = 0, v = first; from < numbers.length; from += stride, ++v) write(v, numbers, from);
   }
-  return { degree, halves, unit };
+  return out;
+}
+
+/// Zeros, for coefficients of at most `largest`.
+export function emptyTexels(degree: number, vertices: number, largest: number): FieldTexels {
+  const unit = 2 ** Math.ceil(Math.log2((largest || 1) / kLargestHalf));
+  return { degree, halves: new Uint16Array(8 * texelsOf(degree) * vertices), unit };
+}
+
+/// Writes the coefficients of a vertex, those of red first, which stand at `from` of `numbers`.
+export function texelWriter({ degree, halves, unit }: FieldTexels) {
+  const [count, width] = [fieldCount(degree), 8 * texelsOf(degree)];
+  const places = Array.from({ length: 3 * count }, (_, s) => halfAt(degree, s % count, Math.floor(s / count)));
+  return (vertex: number, numbers: Float32Array, from: number): void => {
+    for (let s = 0; s < places.length; ++s) halves[width * vertex + places[s]] = halfOf(numbers[from + s] / unit);
+  };
 }
 
 /// No coefficient is larger: stored numbers lie in [-1, 1].

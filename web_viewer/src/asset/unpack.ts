@@ -32,6 +32,7 @@ export interface Unpacked {
   arriving: StoredTransfer[]; // of the matrices, if there are any
   baked: BakedPrimitive[]; // in the order of the file
   links: LightLinks | null; // for lamps that move
+  progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
 }
 
 interface Json {
@@ -102,6 +103,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   const baked = new Map<Primitive, BakedPrimitive>();
   const links = takeLinks(json, bytesIn);
   const field = takeField(json, bytesIn);
+  const progressive = takeProgressive(json, bytesIn);
   const out = new Binary();
   moveImages(json, binary, out);
   for (const moved of [components, glossy?.components, glossy?.lobes])
@@ -129,10 +131,11 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     arriving,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
     links,
+    progressive,
   };
 }
 
-const [kLinks, kField] = ['KILN_meshless_light', 'KILN_light_field'];
+const [kLinks, kField, kProgressive] = ['KILN_meshless_light', 'KILN_light_field', 'KILN_progressive_mesh'];
 
 /// The links stay out of the GLB: its buffer views are others.
 function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLinks | null {
@@ -144,6 +147,14 @@ function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLink
 function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredTransfer | null {
   const extension = readLightField(json);
   return extension ? storedField(takeExtension(json, kField, extension), bytesIn) : null;
+}
+
+/// A copy: light/progressive_mesh.ts reads it when it is asked for.
+function takeProgressive(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>) {
+  const extension = json.extensions?.[kProgressive] as { version: number; bufferView: number } | undefined;
+  if (!extension) return null;
+  if (extension.version !== 1) throw new Error(`/extensions/${kProgressive}/version: only version 1 is read`);
+  return bytesIn(takeExtension(json, kProgressive, extension).bufferView).slice();
 }
 
 function takeExtension<T>(json: Json, name: string, extension: T): T {

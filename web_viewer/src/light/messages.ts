@@ -70,8 +70,13 @@ export interface ProjectReply {
 export type Reply = { serial: number } & (
   | { begun: true }
   // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
-  // numbers; the light field of each part
-  | { opened: ArrayBuffer; samples: Float32Array | null; field: FieldTexels[] | null }
+  // numbers; the light field of each part; the bytes of a progressive mesh
+  | {
+      opened: ArrayBuffer;
+      samples: Float32Array | null;
+      field: FieldTexels[] | null;
+      progressive: Uint8Array<ArrayBuffer> | null;
+    }
   | { values: ValuesReply }
   | { projected: ProjectReply }
   | { failure: string }

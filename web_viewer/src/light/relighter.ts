@@ -18,6 +18,8 @@ export class Relighter {
   samples: Float32Array | null = null;
   /// Its light field, for each part; null: it has none.
   field: FieldTexels[] | null = null;
+  /// The bytes of its progressive mesh; null: it has none.
+  progressive: Uint8Array<ArrayBuffer> | null = null;
 
   constructor() {
     this.begun = new Promise((resolve) => (this.begin = resolve));
@@ -32,7 +34,7 @@ export class Relighter {
   async open(file: ArrayBuffer): Promise<ArrayBuffer> {
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
-    [this.samples, this.field] = [reply.samples, reply.field];
+    [this.samples, this.field, this.progressive] = [reply.samples, reply.field, reply.progressive];
     return reply.opened;
   }
 

@@ -3,7 +3,7 @@
 import { loadDraco } from '../asset/draco_module';
 import type { FieldTexels } from '../asset/light_field';
 import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
-import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
+import { readPacked, unpack, type BakedPrimitive, type Unpacked } from '../asset/unpack';
 import { gatherRows, type LightLinks, lightSenders, readVertices, solveNodes } from './links';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type {
@@ -30,11 +30,11 @@ let parts: BakedPrimitive[] = [];
 let links: LightLinks | null = null;
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
-async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
+async function open({ file }: OpenRequest): Promise<Pick<Unpacked, 'file' | 'progressive'>> {
   const unpacked = unpack(await decoder, readPacked(file));
   [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
   links = unpacked.links;
-  return unpacked.file;
+  return unpacked;
 }
 
 /// It is the page's: nothing here asks for it again.
@@ -149,11 +149,11 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
   const { serial } = data;
   try {
     if (data.kind === 'open') {
-      const opened = await open(data);
+      const { file: opened, progressive } = await open(data);
       const samples = links && samplesOf(links);
       const field = takeField();
-      const give = [...(samples ? [samples] : []), ...(field ?? []).map(({ halves }) => halves)];
-      send({ serial, opened, samples, field }, [opened, ...give.map(({ buffer }) => buffer)]);
+      const give = [samples, progressive, ...(field ?? []).map(({ halves }) => halves)].filter((one) => one !== null);
+      send({ serial, opened, samples, field, progressive }, [opened, ...give.map(({ buffer }) => buffer)]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);

@@ -100,7 +100,7 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     () => divider.dispose(),
     () => probe.dispose(),
   );
-  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report)]).then(
+  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report), openProgressive(page, viewer)]).then(
     () => (document.documentElement.dataset.ready = 'true'),
   );
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
@@ -137,6 +137,15 @@ async function openLamp(page: Page, viewer: Viewer, report: Report | null): Prom
   } catch (error) {
     toast(`The lamp cannot be shown: ${(error as Error).message}`, 'error');
   }
+}
+
+/// A mesh at any level of detail, where the file has one.
+async function openProgressive(page: Page, viewer: Viewer): Promise<void> {
+  if (!viewer.progressive) return;
+  const { ProgressiveView } = await import('./progressive_view');
+  const view = new ProgressiveView(viewer, viewer.progressive);
+  page.onDispose(() => view.dispose());
+  Object.assign(window, { kilnProgressive: view });
 }
 
 /// Of the places where the certificate hung lamps.

@@ -25,6 +25,8 @@ export class Viewer {
   onFailure: (message: string) => void = () => {};
   /// Called when the list of lights has grown.
   onLights: () => void = () => {};
+  /// Told what is shown of a progressive mesh.
+  onDetail: (text: string) => void = () => {};
   /// In place of the relighter's own question, while a lamp that moves is shown (lamp_view.ts).
   askLight: ((spare: Float32Array[]) => Promise<ValuesReply>) | null = null;
   private readonly background = new SkyBackground();
@@ -127,6 +129,11 @@ export class Viewer {
   /// Of a file with links: where lamps that move must be seen from.
   get lampSamples(): Float32Array | null {
     return this.finest.relighter.samples;
+  }
+
+  /// Of a file with a progressive mesh: its bytes.
+  get progressive(): Uint8Array | null {
+    return this.finest.field && this.finest.relighter.progressive;
   }
 
   get lights(): Lights {

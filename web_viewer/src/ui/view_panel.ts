@@ -19,6 +19,8 @@ export interface Shown {
   readonly asset: { hasOriginal: boolean };
   readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
   readonly level?: { field: unknown }; // null: the model has no light field
+  readonly progressive?: Uint8Array | null; // the file has a progressive mesh
+  onDetail?: (text: string) => void;
   onLights: () => void;
   useFile(file: File): Promise<void>;
 }
@@ -144,6 +146,7 @@ export class ViewPanel {
       controls.select('mode', 'Surface', () => modes).element,
       slot,
       ...(hasLevels ? [levelSlider(controls, this.has.levels)] : []),
+      ...(viewer.progressive ? this.detail() : []),
       controls.checkbox('wire', 'Wireframe'),
       ...(this.has.grid ? this.grid() : []),
       compareSwitch(viewer, controls),
@@ -166,6 +169,15 @@ export class ViewPanel {
     return [controls.checkbox('wire', 'Wireframe'), surface, compare, why];
   }
 
+  private detail(): HTMLElement[] {
+    const { controls, viewer } = this;
+    const text = h('p', { class: 'hint', id: 'detail-text' });
+    viewer.onDetail = (what) => (text.textContent = what);
+    const show = (share: number) => (share === 1 ? 'all' : share.toFixed(2));
+    const play = h('button', { type: 'button', onclick: () => playDetail(viewer.state) }, 'Play from coarse to fine');
+    return [controls.slider('detail', 'Progressive mesh', { min: 0, max: 1, step: 0.002, show }), play, text];
+  }
+
   private grid(): HTMLElement[] {
     const { controls } = this;
     return [
@@ -177,9 +189,26 @@ export class ViewPanel {
 
   dispose(): void {
     this.viewer.onLights = () => {};
+    this.viewer.onDetail = () => {};
     this.controls.dispose();
     this.element.remove();
   }
+}
+
+const kPlaySeconds = 6;
+
+/// Until it is done or somebody else moves the slider.
+function playDetail(state: Store<ViewState>): void {
+  const start = performance.now();
+  let last = 0;
+  state.set({ detail: last });
+  const step = () => {
+    if (state.get().detail !== last) return;
+    last = Math.min(1, (performance.now() - start) / (1000 * kPlaySeconds));
+    state.set({ detail: last });
+    if (last < 1) requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
 }
 
 function slotName({ order }: Pick<StoredTransfer, 'order'>, controls: Controls): HTMLElement {
