@@ -184,6 +184,8 @@ void add_reference(Program& program) {
       ->check(CLI::Range(-1, 1000))
       ->type_name("N");
   command.parser->add_flag("--indirect", fields.indirect, "reflected light only, as a grid holds it");
+  command.parser->add_flag("--highlights", fields.highlights,
+                           "towards eyes: adds highlights of punctual lights, as a light field holds them");
   command.parser->add_option("--sh-order", fields.sh_order, "projects the light to this order first; 0: full detail")
       ->check(CLI::Range(0, 10))
       ->type_name("N");

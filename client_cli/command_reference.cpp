@@ -35,6 +35,7 @@ Outcome<ExitCode> run(const TruthOptions& options, Session& session) {
                            .from = options.indirect ? 1 : 0,
                            .sh_order = options.sh_order,
                            .seed = options.seed,
+                           .highlights = options.highlights,
                            .look = {options.scene_albedo, points}};
   ValueTable table{points, traced_values(scene, places, environment, trace, threads), true};
   return write_values(table, scene.frame.scale, options.output, session);

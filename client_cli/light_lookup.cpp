@@ -9,7 +9,9 @@
 #include "core/bake/eye_material.h"
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/lightfield/seen.h"
 #include "core/mesh/topology.h"
+#include "core/trace/highlights.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
 #include "core/trace/surface_samples.h"
@@ -172,10 +174,14 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
     out.push_back(light_value(baked.scene, *place, value, {}, options.scene_albedo));
     const Vec3d* view = view_of(options, out.size() - 1);
     if (!view) continue;
+    const Vec3d normal = match_normal(baked.scene.mesh, *place);
+    if (!baked.field.coefficients.empty()) {
+      out.back().radiance = seen_radiance(baked.field, point.triangle, place->u, place->v, normal, normalized(*view));
+      continue;
+    }
     const SurfacePoint surface = surface_at(baked.scene, *place);
-    const EyeRadiance radiance = eye_radiance(
-        baked, seen,
-        {point, match_normal(baked.scene.mesh, *place), normalized(*view), eye_material(baked.scene, surface)});
+    const EyeRadiance radiance =
+        eye_radiance(baked, seen, {point, normal, normalized(*view), eye_material(baked.scene, surface)});
     out.back().radiance = radiance.diffuse + radiance.specular + to_double(emission_at(baked.scene, surface));
   }
   return out;
@@ -225,6 +231,8 @@ std::vector<LightValue> traced_values(const Scene& scene, const Places& places,
     return trace_specular(tracer, seen.eyed, light, batch, threads);
   });
   show_to_eyes(scene, places, seen, specular, out);
+  for (std::size_t k = 0; k < seen.index.size() && options.highlights; ++k)
+    out[seen.index[k]].radiance += punctual_highlights(tracer, seen.eyed[k]);
   return out;
 }
 

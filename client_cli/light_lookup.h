@@ -26,7 +26,8 @@ Places place_points(const Scene&, std::span<const QueryPoint>, Threads&);
 /// eye
 /// (`points`, where it has one) that is instead
 ///   (1 - metallic) albedo (1 - E) value + specular + emission                                                     (1)
-/// as core/artifact/eye.h says; of an artefact only where it has matrices, as everything else in it is diffuse.
+/// as core/artifact/eye.h says; of an artefact only where it has matrices, as everything else in it is diffuse, and of
+/// a light field what that shows (core/lightfield/seen.h), under the light it was baked with.
 struct LookupOptions {
   bool scene_albedo = false;
   std::span<const QueryPoint> points = {};  // none, or one for each place
@@ -48,6 +49,7 @@ struct TraceOptions {
   int from = 0;        // reflections that light must have made; 1: no direct light
   int sh_order = 0;    // > 0: the environment is projected to that order first
   std::uint64_t seed = 0;
+  bool highlights = false;  // of punctual lights, towards eyes: a light field holds them, matrices do not
   LookupOptions look = {};
 };
 std::vector<LightValue> traced_values(const Scene&, const Places&, const std::optional<Environment>&,

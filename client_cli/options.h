@@ -81,7 +81,8 @@ struct TruthOptions {
   LightOptions light;
   std::string lamp;  // of --light; empty: none
   bool scene_albedo = false;
-  bool indirect = false;  // reflected light only, as a grid holds it
+  bool indirect = false;    // reflected light only, as a grid holds it
+  bool highlights = false;  // of punctual lights, towards eyes
   int samples = 1024, bounces = -1, sh_order = 0, threads = 0;
   std::uint64_t seed = 0;
 };

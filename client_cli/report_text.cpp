@@ -44,8 +44,8 @@ std::string error_text(const json& error) {
   return out;
 }
 
-json grid_certificate(const json& document) {
-  const json::json_pointer place("/grid/certificate");
+json certificate_of(const json& document, const char* step) {
+  const json::json_pointer place(std::string("/") + step + "/certificate");
   return document.contains(place) ? document[place] : json();
 }
 
@@ -100,7 +100,13 @@ std::string certificate_text(std::string_view report) {
            " points): " + error_text(certificate["seen"]);
   if (certificate.contains("job_light") && certificate["job_light"].is_object())
     out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
-  if (const json grid = grid_certificate(document); grid.is_object())
+  const json levels = document.contains("lightfield") ? list_of(document["lightfield"], "levels") : json::array();
+  for (const json& level : levels) {
+    if (!level.contains("certificate") || !level["certificate"].is_object()) continue;
+    out += "\ntowards eyes, " + text_of(level, "file") + " (" + count(number_of(level, "triangles")) +
+           " triangles): " + error_text(level["certificate"]);
+  }
+  if (const json grid = certificate_of(document, "grid"); grid.is_object())
     out += "\nof the grid, at " + count(number_of(grid, "points")) + " points of the surface: " + error_text(grid);
   return out;
 }
@@ -132,7 +138,8 @@ std::optional<double> certified_error(std::string_view report) {
   if (!document.contains("certificate") || !document["certificate"].is_object()) return std::nullopt;
   const json& certificate = document["certificate"];
   if (!certificate.contains("relrmse") || !certificate["relrmse"].is_number()) return std::nullopt;
-  return std::max(certificate["relrmse"].get<double>(), number_of(grid_certificate(document), "relrmse"));
+  return std::max({certificate["relrmse"].get<double>(), number_of(certificate_of(document, "grid"), "relrmse"),
+                   number_of(certificate_of(document, "lightfield"), "relrmse")});
 }
 
 }  // namespace kiln

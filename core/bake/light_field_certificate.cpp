@@ -11,7 +11,7 @@
 #include "core/mesh/topology.h"
 #include "core/prt/hidden.h"
 #include "core/prt/lobe_table.h"
-#include "core/trace/lights.h"
+#include "core/trace/highlights.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
 #include "core/trace/surface_samples.h"
@@ -29,24 +29,6 @@ struct Eyes {
   std::vector<Vec3d> reflected;       // by the diffuse layer towards the eye, of its light
   std::vector<Vec3d> known;           // emission and highlights of punctual lights
 };
-
-/// What punctual lights send to the eye by the specular layer.
-Vec3d highlights(const Tracer& tracer, const EyedPoint& eyed) {
-  const Basis<double> basis = basis_around(normalized(to_double(eyed.at.normal)));
-  const Vec3d v = basis.to_local(to_double(eyed.view));
-  const Vec3f origin = offset_origin(eyed.at.position, eyed.at.face_normal);
-  Vec3d sum;
-  for (const Light& light : tracer.scene().lights) {
-    const LightArrival arrival = light_arrival(light, to_double(origin));
-    const Vec3d l = basis.to_local(arrival.direction);
-    const double lobe = ggx_cosine(eyed.alpha, v, l);
-    if (!(lobe > 0) || arrival.irradiance == Vec3d{}) continue;
-    const float far = std::isfinite(arrival.distance) ? static_cast<float>(arrival.distance) : 4.0F;
-    if (tracer.occluded(origin, to_float(arrival.direction), far)) continue;
-    sum += (eyed.f0 + (Vec3d{1, 1, 1} - eyed.f0) * schlick_weight(v, l)) * arrival.irradiance * lobe;
-  }
-  return sum;
-}
 
 Eyes open_eyes(const FieldCheck& check) {
   const Scene& input = check.truth.scene();
@@ -76,7 +58,7 @@ Eyes open_eyes(const FieldCheck& check) {
     out.truth.push_back(eyed);
     out.below.push_back(place);
     out.reflected.push_back(material.diffuse * (1 - lobe_at(lobes, dot(there, view), material.roughness).kept()));
-    out.known.push_back(to_double(emission_at(input, at)) + highlights(check.truth, eyed));
+    out.known.push_back(to_double(emission_at(input, at)) + punctual_highlights(check.truth, eyed));
   }
   return out;
 }

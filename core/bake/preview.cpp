@@ -9,6 +9,7 @@
 #include "core/artifact/look.h"
 #include "core/artifact/png.h"
 #include "core/bake/eye_material.h"
+#include "core/lightfield/seen.h"
 #include "core/scene/texture.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
@@ -84,6 +85,7 @@ struct Painter {
     const Scene& scene = tracer.scene();
     const SurfacePoint place = surface_point(scene, hit.triangle, hit.u, hit.v);
     const Triangle& t = scene.mesh.triangles[hit.triangle];
+    if (!baked.field.coefficients.empty()) return tone_map(of_field(hit, place, t, direction) * baked.exposure);
     if (baked.glossy && has_matrices(baked.glossy, t)) return shown(specular(hit, place, t, direction), place);
     const Vec3f at = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
     return shown(at * albedo_at(scene, place), place);
@@ -91,6 +93,11 @@ struct Painter {
 
   Vec3f shown(const Vec3f& reflected, const SurfacePoint& place) const {
     return tone_map((reflected + emission_at(tracer.scene(), place)) * baked.exposure);
+  }
+
+  Vec3f of_field(const Hit& hit, const SurfacePoint& place, const Triangle& t, const Vec3f& direction) const {
+    const Vec3d normal = normalized(to_double(place.normal)), view = normalized(to_double(-direction));
+    return to_float(seen_radiance(baked.field, t, hit.u, hit.v, normal, view));
   }
 
   /// All that a part with matrices reflects to the camera.
