@@ -119,10 +119,11 @@ test('what an eye sees between three vertices is what kiln says', () => {
     const normal = unit(mean(part.normals, corners, weights));
     if (dot(normal, view) < 0) ++below;
     const bound = rounding(part.field, corners, weights, normal, view);
-    seenRadiance(part.field, corners, weights, normal, view).forEach((x, c) =>
+    seenRadiance(part.field, corners, weights, normal, view).forEach((x, c) => {
       // and kiln looks the place up in floats: 2^-24 of the cube beside it, 1e-5 of a triangle
-      assert.ok(Math.abs(x - expected[c]) <= bound[c] + 1e-5 * (1 + x), `${x} is not ${expected[c]} within ${bound[c]}`),
-    );
+      const most = bound[c] + 1e-5 * (1 + x);
+      assert.ok(Math.abs(x - expected[c]) <= most, `${x} is not ${expected[c]} within ${most}`);
+    });
   }
   assert.ok(rows.length >= 80 && below >= 20, 'too few rows, or no eye below a horizon');
 });

@@ -1,5 +1,5 @@
-// node field_points.mjs SCENE.glb: places on its triangles and eyes all around, 40 for each part, as kiln eval asks for them
-// (fixtures/make_field.sh).
+// node field_points.mjs SCENE.glb: places on its triangles and eyes all around, 40 for each part, as kiln eval asks
+// for them (fixtures/make_field.sh).
 
 import { readFileSync } from 'node:fs';
 import { glbJson } from './read_glb.mjs';

@@ -34,7 +34,8 @@ const picture = async (page) => {
     for (let i = 0; i < pixels.length; i += 4096) text += String.fromCharCode(...pixels.subarray(i, i + 4096));
     return { pixels: btoa(text), triangles: shape?.mesh.triangleCount, own: model.root.visible };
   });
-  return { ...shown, pixels: Buffer.from(shown.pixels, 'base64'), text: await page.locator('#detail-text').innerText() };
+  const text = await page.locator('#detail-text').innerText();
+  return { ...shown, pixels: Buffer.from(shown.pixels, 'base64'), text };
 };
 
 /// RMS over the pixels that are not background in both, in parts of white.
@@ -64,8 +65,8 @@ test('fine levels look as the file does, and the coarser one goes the less they 
       errors.push(apart(pixels, own.pixels));
       triangles.push(now);
     }
-    // Stored positions, normals and light are rounded in the file's own mesh and not in the progressive one, silhouettes
-    // by parts of a pixel: .0062 was measured.
+    // Stored positions, normals and light are rounded in the file's own mesh and not in the progressive one,
+    // silhouettes by parts of a pixel: .0062 was measured.
     assert.ok(errors[0] < 0.01, `${errors}`);
     assert.ok(errors[0] < errors[1] && errors[1] < errors[2], `${errors}`);
     assert.ok(triangles[0] > triangles[1] && triangles[1] > triangles[2], `${triangles}`);

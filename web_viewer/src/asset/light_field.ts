@@ -1,10 +1,10 @@
 // KILN_light_field: radiance towards every eye, as reflected radiance functions (r-RFs) at the vertices.
-//   radiance[c] = max(0, sum_k weight[k] sum_i r-RF_k[c][i] Y_i(r)),   r = 2 (n.w) n - w           (Vanhoey et al. 2015, eq. 8)
-// k: the corners of a triangle, n: the interpolated normal, w: the way to the eye, raised to the horizon of n where it is
-// below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
+//   radiance[c] = max(0, sum_k weight[k] sum_i r-RF_k[c][i] Y_i(r)),   r = 2 (n.w) n - w    (Vanhoey et al. 2015, eq. 8)
+// k: the corners of a triangle, n: the interpolated normal, w: the way to the eye, raised to the horizon of n where it
+// is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
 //
-// A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel c; what
-// is left over follows, all of red first. 16 bytes a texel: 160 a vertex at degree 4, 304 at 6, 496 at 8.
+// A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
+// c; what is left over follows, all of red first. 16 bytes a texel: 160 a vertex at degree 4, 304 at 6, 496 at 8.
 
 import { coefficientsOf } from '../light/transfer';
 import { evaluateSh } from '../light/sh';
@@ -60,7 +60,8 @@ function checkField(e: LightFieldExtension): void {
     if (!good) throw new Error(`/extensions/${kName}/${member}: ${what}`);
   };
   must(e.version === 1, 'version', `only version 1 is read, this is ${e.version}`);
-  must(e.basis === 'real-sh' && e.condonShortley === false, 'basis', 'must be real-sh without the Condon-Shortley phase');
+  const basis = e.basis === 'real-sh' && e.condonShortley === false;
+  must(basis, 'basis', 'must be real-sh without the Condon-Shortley phase');
   must(e.reflected === true, 'reflected', 'radiance functions must be reflected');
   must(Number.isInteger(e.degree) && e.degree >= 0 && e.degree <= kMostDegree, 'degree', 'must be 0 to 8');
   must(e.form === 'raw' || e.form === 'components', 'form', 'must be raw or components');
@@ -74,7 +75,10 @@ function checkField(e: LightFieldExtension): void {
 }
 
 /// What the stored numbers mean, as if they were transfer vectors. `bytesIn`: of a buffer view.
-export function storedField(e: LightFieldExtension, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredTransfer {
+export function storedField(
+  e: LightFieldExtension,
+  bytesIn: (view: number) => Uint8Array<ArrayBuffer>,
+): StoredTransfer {
   const order = e.degree + 1;
   const shape = { ...e, version: 2, order, channels: 3 as const, fixed: false, slots: order * order };
   if (e.form === 'raw') return { ...shape, components: undefined, rows: new Float32Array(0) };
@@ -153,7 +157,13 @@ export function reflectedView(normal: Vector, view: Vector): Vector {
 }
 
 /// Radiance that an eye sees between three vertices: (8). `weights` are barycentric.
-export function seenRadiance(field: FieldTexels, corners: Vector, weights: Vector, normal: Vector, view: Vector): number[] {
+export function seenRadiance(
+  field: FieldTexels,
+  corners: Vector,
+  weights: Vector,
+  normal: Vector,
+  view: Vector,
+): number[] {
   const y = new Float64Array(fieldCount(field.degree));
   evaluateSh(field.degree + 1, ...reflectedView(normal, view), y);
   const width = 8 * texelsOf(field.degree);

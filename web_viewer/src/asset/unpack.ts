@@ -243,7 +243,8 @@ function takeBaked(
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
   const field = light && fieldTexels(light, light.attributes.map((name) => floatsOf(name, 4)));
-  for (const name of [...names, ...matrices, ...(light?.attributes ?? []), 'COLOR_0']) delete primitive.attributes[name];
+  const taken = [...names, ...matrices, ...(light?.attributes ?? []), 'COLOR_0'];
+  for (const name of taken) delete primitive.attributes[name];
   const [positions, normals] = [floatsOf('POSITION', 3), floatsOf('NORMAL', 3)];
   return { stored, weights, field, positions, normals, indices: mesh.indices() };
 }

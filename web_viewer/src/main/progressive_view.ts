@@ -1,6 +1,6 @@
 // A progressive mesh under its light field, at any level of detail, in place of the file's own triangles. Nothing is
-// decoded before it is asked for. A step costs a pass over the triangles that are shown: arrays are filled anew, and r-RFs
-// are written for the vertices that have changed.
+// decoded before it is asked for. A step costs a pass over the triangles that are shown: arrays are filled anew, and
+// r-RFs are written for the vertices that have changed.
 
 import { BufferAttribute, BufferGeometry, type DataTexture, Group, Mesh, type ShaderMaterial } from 'three';
 import { emptyTexels, type FieldTexels, texelWriter } from '../asset/light_field';
@@ -144,7 +144,8 @@ class ProgressiveShape {
     }
     for (const { mesh, used } of this.parts) {
       mesh.geometry.setDrawRange(0, 3 * used);
-      for (const attribute of Object.values(mesh.geometry.attributes)) (attribute as BufferAttribute).needsUpdate = true;
+      const { attributes } = mesh.geometry;
+      for (const name of Object.keys(attributes)) attributes[name].needsUpdate = true;
     }
   }
 
