@@ -6,13 +6,18 @@ import { after, before, test } from 'node:test';
 import { axeSource, openPage, ready, startBrowser, until } from './browser.mjs';
 import { jobId, startMock } from './mock_server.mjs';
 
-let browser, mock;
+let browser, mock, fieldMock;
 before(async () => {
   [browser, mock] = [await startBrowser(), await startMock()];
+  const file = readFileSync(new URL('fixtures/progressive.glb', import.meta.url));
+  fieldMock = await startMock({ files: { 'scene.glb': file } });
+  const { artifacts } = fieldMock.jobs.get(jobId('done'));
+  artifacts.push({ ...artifacts[0], name: 'lod1.glb' });
 });
 after(async () => {
   await browser.close();
   await mock.close();
+  await fieldMock.close();
 });
 
 const view = `/view/${jobId('done')}`;
@@ -26,6 +31,11 @@ const kPages = {
       await page.locator('summary', { hasText: 'Statistics' }).click();
       await until(page, () => !document.querySelector('.legend').hidden);
     },
+  },
+  'a light field with levels and a progressive mesh': {
+    path: `${view}#detail=0.5`,
+    field: true,
+    wait: () => document.documentElement.dataset.ready === 'true',
   },
   'help dialog': {
     path: view,
@@ -55,10 +65,10 @@ async function violations(page) {
   return violations.map(({ id, help, nodes }) => `${id}: ${help}: ${nodes.map((node) => node.html).join(' ')}`);
 }
 
-for (const [name, { path, wait, act }] of Object.entries(kPages)) {
+for (const [name, { path, wait, act, field }] of Object.entries(kPages)) {
   for (const colorScheme of ['dark', 'light']) {
     test(`axe finds nothing on: ${name}, ${colorScheme}`, async () => {
-      const page = await openPage(browser, mock.url + path, { colorScheme });
+      const page = await openPage(browser, (field ? fieldMock : mock).url + path, { colorScheme });
       await until(page, wait);
       if (act) await act(page);
       assert.deepEqual(await violations(page), []);

@@ -4,6 +4,8 @@
 //   first_picture_ms   to the first lit picture of the model itself; both in an open window
 //   launched_*         the same right after Chromium has been started: its own pages (tool bar, panels) take both cores then
 //   relight_ms         in the worker, for a new light (median); frame_ms: one orbit step, drawn and read back (median)
+//   of a light field   its degree, and frame_ms by what is drawn: the field at each pixel, at the vertices, and diffuse
+//                      light alone, which tells what triangles and pixels cost without it
 
 import { readFileSync } from 'node:fs';
 import { loadavg } from 'node:os';
@@ -35,9 +37,10 @@ async function relights(page) {
   return median(out);
 }
 
-const frames = (page) =>
-  page.evaluate(() => {
-    const { stage } = window.kilnViewer;
+const frames = (page, mode) =>
+  page.evaluate((mode) => {
+    const { stage, state } = window.kilnViewer;
+    state.set({ mode });
     const gl = stage.renderer.getContext();
     const times = [];
     for (let i = 0; i < 12; ++i) {
@@ -48,7 +51,7 @@ const frames = (page) =>
       times.push(performance.now() - start);
     }
     return times;
-  });
+  }, mode);
 
 const missing = whatIsMissing();
 if (missing) {
@@ -68,7 +71,11 @@ for (let run = 0; run < kRuns; ++run) {
 }
 const { page } = open[kRuns - 1];
 const of = (runs, what) => round(median(runs.map((run) => run[what])));
-const [relight_ms, times] = [await relights(page), await frames(page)];
+const relight_ms = await relights(page);
+const degree = await page.evaluate(() => window.kilnViewer.level.field?.degree);
+const frame_ms = {};
+for (const mode of degree === undefined ? ['shaded'] : ['shaded', 'vertices', 'light'])
+  frame_ms[mode] = round(median(await frames(page, mode)));
 console.log(
   JSON.stringify({
     bench: 'viewer',
@@ -81,7 +88,8 @@ console.log(
     launched_preview_ms: of(launched, 'preview'),
     launched_first_picture_ms: of(launched, 'picture'),
     relight_ms: round(relight_ms),
-    frame_ms: round(median(times)),
+    frame_ms: degree === undefined ? frame_ms.shaded : frame_ms,
+    degree,
     load: round(loadavg()[0]),
   }),
 );

@@ -411,8 +411,8 @@ test('after dispose no GPU memory, no worker and no listener is left', () =>
       page,
       () =>
         window.kilnViewer.comparison !== null &&
-        window.kilnViewer.heatMap !== null &&
-        window.kilnViewer.wireframe !== null,
+        window.kilnViewer.surfaces.heatMap !== null &&
+        window.kilnViewer.surfaces.wireframe !== null,
     );
     const before = await page.evaluate(() => {
       const { stage } = window.kilnViewer;
@@ -450,10 +450,10 @@ test('each false-colour picture, wireframe and comparison gives back what it too
     const set = (change) => page.evaluate((change) => window.kilnViewer.state.set(change), change);
     for (const mode of ['weighted', 'coefficient', 'measure']) {
       await set({ mode, wire: true });
-      await until(page, () => window.kilnViewer.heatMap !== null);
+      await until(page, () => window.kilnViewer.surfaces.heatMap !== null);
       assert.ok((await memory()).geometries > before.geometries);
       await set({ mode: 'shaded', wire: false });
-      await until(page, () => window.kilnViewer.heatMap === null);
+      await until(page, () => window.kilnViewer.surfaces.heatMap === null);
       assert.deepEqual(await memory(), before);
     }
   }));

@@ -141,6 +141,13 @@ export function follow(
   return () => source.close();
 }
 
+export interface LevelReport {
+  file: string;
+  vertices: number;
+  triangles: number;
+  certificate?: { relrmse: number } | null; // towards every eye, against the surface as it was baked
+}
+
 /// report.json; every part may be missing in an old one.
 export interface Report {
   engine?: string;
@@ -202,6 +209,11 @@ export interface Report {
     normal_degrees_rms_without_map: number;
     charts: number;
     input?: { triangles?: number }; // where the recipe goes on with light; else `scene` is about the model
+  };
+  lightfield?: {
+    degree: number;
+    certificate?: { relrmse: number; interval?: [number, number]; points?: number; samples?: number } | null;
+    levels?: LevelReport[]; // of detail: scene.glb, then lod1.glb and on
   };
   glossy?: Partial<Record<'radiance' | 'transport' | 'truncation', { relrmse: number; interval?: [number, number] }>>;
 }

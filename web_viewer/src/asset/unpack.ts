@@ -1,10 +1,12 @@
 // scene.glb as the server has it -> a plain GLB that any glTF loader reads by itself, and the transfer vectors apart.
 //
 // KHR_draco_mesh_compression becomes ordinary accessors, in both scenes; these share their compressed bytes, and each mesh is
-// decoded once. The transfer vectors, and the COLOR_0 that stands for them in other viewers, stay out of the GLB.
+// decoded once. The transfer vectors, light fields, and the COLOR_0 that stands for them in other viewers, stay out of
+// the GLB.
 
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
+import { type FieldTexels, fieldTexels, readLightField, storedField } from './light_field';
 import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
 import {
   arrivingTransfers,
@@ -18,6 +20,7 @@ import {
 export interface BakedPrimitive {
   stored: Float32Array[]; // its `_PRT_k`, four numbers of each vertex
   weights: Float32Array[]; // its `_GLOSSY_k` alike; none: it has no matrices
+  field: FieldTexels | null; // its `_SLF_k`, if the file has a light field
   positions: Float32Array;
   normals: Float32Array;
   indices: Uint32Array;
@@ -29,6 +32,7 @@ export interface Unpacked {
   arriving: StoredTransfer[]; // of the matrices, if there are any
   baked: BakedPrimitive[]; // in the order of the file
   links: LightLinks | null; // for lamps that move
+  progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
 }
 
 interface Json {
@@ -98,6 +102,8 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
   const links = takeLinks(json, bytesIn);
+  const field = takeField(json, bytesIn);
+  const progressive = takeProgressive(json, bytesIn);
   const out = new Binary();
   moveImages(json, binary, out);
   for (const moved of [components, glossy?.components, glossy?.lobes])
@@ -107,7 +113,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     const mesh = new DracoMesh(draco, bytes);
     try {
       for (const primitive of sharing) {
-        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension));
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension, field));
         makePlain(primitive, json, mesh, { accessors, out });
       }
     } finally {
@@ -125,18 +131,36 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     arriving,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
     links,
+    progressive,
   };
 }
 
-const kLinks = 'KILN_meshless_light';
+const [kLinks, kField, kProgressive] = ['KILN_meshless_light', 'KILN_light_field', 'KILN_progressive_mesh'];
 
 /// The links stay out of the GLB: its buffer views are others.
 function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLinks | null {
   const extension = json.extensions?.[kLinks] as LinksExtension | undefined;
+  return extension ? readLinks(takeExtension(json, kLinks, extension), bytesIn) : null;
+}
+
+/// Light fields stay out of the GLB too.
+function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredTransfer | null {
+  const extension = readLightField(json);
+  return extension ? storedField(takeExtension(json, kField, extension), bytesIn) : null;
+}
+
+/// A copy: light/progressive_mesh.ts reads it when it is asked for.
+function takeProgressive(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>) {
+  const extension = json.extensions?.[kProgressive] as { version: number; bufferView: number } | undefined;
   if (!extension) return null;
-  delete json.extensions![kLinks];
-  json.extensionsUsed = json.extensionsUsed?.filter((name) => name !== kLinks);
-  return readLinks(extension, bytesIn);
+  if (extension.version !== 1) throw new Error(`/extensions/${kProgressive}/version: only version 1 is read`);
+  return bytesIn(takeExtension(json, kProgressive, extension).bufferView).slice();
+}
+
+function takeExtension<T>(json: Json, name: string, extension: T): T {
+  delete json.extensions![name];
+  json.extensionsUsed = json.extensionsUsed?.filter((one) => one !== name);
+  return extension;
 }
 
 const isBaked = ({ extensions }: Primitive): boolean => extensions?.KILN_radiance_transfer !== undefined;
@@ -204,7 +228,12 @@ function byCompressedBytes(
 }
 
 /// Takes the transfer vectors and matrices, and what stands for them, out of the primitive.
-function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTransferExtension): BakedPrimitive {
+function takeBaked(
+  primitive: Primitive,
+  mesh: DracoMesh,
+  extension: RadianceTransferExtension,
+  light: StoredTransfer | null,
+): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
   const floatsOf = (name: string, components: number) => {
     if (ids[name] === undefined) throw new Error(`a baked primitive lacks ${name}`);
@@ -213,9 +242,11 @@ function takeBaked(primitive: Primitive, mesh: DracoMesh, extension: RadianceTra
   const own = primitive.extensions!.KILN_radiance_transfer as { glossy?: boolean };
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
-  for (const name of [...names, ...matrices, 'COLOR_0']) delete primitive.attributes[name];
+  const field = light && fieldTexels(light, light.attributes.map((name) => floatsOf(name, 4)));
+  const taken = [...names, ...matrices, ...(light?.attributes ?? []), 'COLOR_0'];
+  for (const name of taken) delete primitive.attributes[name];
   const [positions, normals] = [floatsOf('POSITION', 3), floatsOf('NORMAL', 3)];
-  return { stored, weights, positions, normals, indices: mesh.indices() };
+  return { stored, weights, field, positions, normals, indices: mesh.indices() };
 }
 
 /// Gives the primitive accessors of its own. (three.js shares what shares an accessor; disposing of one user would pull it from

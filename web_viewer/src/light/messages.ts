@@ -2,6 +2,7 @@
 // begins: its first message is a reply to no request.
 
 import type { EquirectMap } from './equirect';
+import type { FieldTexels } from '../asset/light_field';
 import type { PointLamp } from './links';
 
 /// Unpacks a scene.glb, keeps its transfer vectors and hands over the rest.
@@ -68,8 +69,14 @@ export interface ProjectReply {
 
 export type Reply = { serial: number } & (
   | { begun: true }
-  | { opened: ArrayBuffer; samples: Float32Array | null } // a GLB without compression and without transfer vectors; of links
-  // the senders' samples: place and normal of each, six numbers
+  // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
+  // numbers; the light field of each part; the bytes of a progressive mesh
+  | {
+      opened: ArrayBuffer;
+      samples: Float32Array | null;
+      field: FieldTexels[] | null;
+      progressive: Uint8Array<ArrayBuffer> | null;
+    }
   | { values: ValuesReply }
   | { projected: ProjectReply }
   | { failure: string }

@@ -71,6 +71,8 @@ export class ProgressiveMesh {
   vertexCount: number;
   triangleCount: number;
   level = 0;
+  /// Vertices whose numbers have changed since somebody emptied this.
+  readonly touched = new Set<number>();
 
   private readonly splits: Uint32Array;
   private readonly errors: Float32Array;
@@ -115,6 +117,15 @@ export class ProgressiveMesh {
   /// Of a level: an estimate of the relative RMS error against the finest one.
   error(level: number): number {
     return level + 1 < this.levels ? this.errors[kSplit * level + kError] : 0;
+  }
+
+  /// The largest magnitude that a column has at any level.
+  largest(name: string): number {
+    const at = [...this.columns.keys()].indexOf(name);
+    let most = 0;
+    for (const { values } of [this.columns.get(name)!, this.moved[at]])
+      for (const value of values) most = Math.max(most, Math.abs(value));
+    return most;
   }
 
   /// Takes as many steps as lie between the current level and this one.
@@ -163,6 +174,7 @@ export class ProgressiveMesh {
 
   private swap(row: number): void {
     const vertex = this.movedVertex[row];
+    this.touched.add(vertex);
     let column = 0;
     for (const { values, width } of this.columns.values()) {
       const other = this.moved[column++].values;

@@ -1,5 +1,6 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
+import type { FieldTexels } from '../asset/light_field';
 import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
 
@@ -15,6 +16,10 @@ export class Relighter {
   private begin: () => void = () => {};
   /// Of the open file: where lamps that move must be seen from, place and normal (unit cube); null: it has no links.
   samples: Float32Array | null = null;
+  /// Its light field, for each part; null: it has none.
+  field: FieldTexels[] | null = null;
+  /// The bytes of its progressive mesh; null: it has none.
+  progressive: Uint8Array<ArrayBuffer> | null = null;
 
   constructor() {
     this.begun = new Promise((resolve) => (this.begin = resolve));
@@ -27,10 +32,9 @@ export class Relighter {
   /// Takes the bytes of a scene.glb, and resolves with a GLB without its compression and transfer vectors. Everything below is
   /// about that file then.
   async open(file: ArrayBuffer): Promise<ArrayBuffer> {
-    this.samples = null;
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
-    this.samples = reply.samples;
+    [this.samples, this.field, this.progressive] = [reply.samples, reply.field, reply.progressive];
     return reply.opened;
   }
 

@@ -1,8 +1,9 @@
 // The light worker: opens one asset, holds its transfer vectors and answers messages.ts.
 
 import { loadDraco } from '../asset/draco_module';
+import type { FieldTexels } from '../asset/light_field';
 import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
-import { readPacked, unpack, type BakedPrimitive } from '../asset/unpack';
+import { readPacked, unpack, type BakedPrimitive, type Unpacked } from '../asset/unpack';
 import { gatherRows, type LightLinks, lightSenders, readVertices, solveNodes } from './links';
 import { projectEquirect, shrinkEquirect } from './equirect';
 import type {
@@ -29,11 +30,18 @@ let parts: BakedPrimitive[] = [];
 let links: LightLinks | null = null;
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
-async function open({ file }: OpenRequest): Promise<ArrayBuffer> {
+async function open({ file }: OpenRequest): Promise<Pick<Unpacked, 'file' | 'progressive'>> {
   const unpacked = unpack(await decoder, readPacked(file));
   [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
   links = unpacked.links;
-  return unpacked.file;
+  return unpacked;
+}
+
+/// It is the page's: nothing here asks for it again.
+function takeField(): FieldTexels[] | null {
+  const field = parts.flatMap((part) => part.field ?? []);
+  for (const part of parts) part.field = null;
+  return field.length > 0 ? field : null;
 }
 
 /// Place and unit normal of each sample of the senders.
@@ -141,9 +149,11 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
   const { serial } = data;
   try {
     if (data.kind === 'open') {
-      const opened = await open(data);
+      const { file: opened, progressive } = await open(data);
       const samples = links && samplesOf(links);
-      send({ serial, opened, samples }, samples ? [opened, samples.buffer] : [opened]);
+      const field = takeField();
+      const give = [samples, progressive, ...(field ?? []).map(({ halves }) => halves)].filter((one) => one !== null);
+      send({ serial, opened, samples, field, progressive }, [opened, ...give.map(({ buffer }) => buffer)]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);

@@ -7,7 +7,6 @@ import {
   Color,
   type DataTexture,
   DynamicDrawUsage,
-  type InterleavedBufferAttribute,
   type Material,
   type Mesh,
   type MeshBasicMaterial,
@@ -23,9 +22,10 @@ import { listTexture, lobeTexture } from '../shaders/mirror';
 
 export interface BakedPart {
   mesh: Mesh<BufferGeometry, Material>;
+  geometry: BufferGeometry; // kept here: false colours and light fields put another one in its place
   material: ShaderMaterial;
+  unlit: MeshBasicMaterial; // of scene 0, which says opacity and sides
   light: BufferAttribute;
-  normal: BufferAttribute | InterleavedBufferAttribute; // kept here: a false-colour geometry has none
 }
 
 export class BakedModel {
@@ -59,13 +59,14 @@ export class BakedModel {
   }
 
   get triangles(): number {
-    return this.parts.reduce((sum, part) => sum + (part.mesh.geometry.index?.count ?? 0) / 3, 0);
+    return this.parts.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3, 0);
   }
 
   get normals(): Float32Array[] {
-    return this.parts.map(({ normal }) =>
-      Float32Array.from({ length: 3 * normal.count }, (_, i) => normal.getComponent(Math.floor(i / 3), i % 3)),
-    );
+    return this.parts.map(({ geometry }) => {
+      const normal = geometry.getAttribute('normal');
+      return Float32Array.from({ length: 3 * normal.count }, (_, i) => normal.getComponent(Math.floor(i / 3), i % 3));
+    });
   }
 
   /// Shows new light and gives back the arrays it replaces.
@@ -110,7 +111,8 @@ export class BakedModel {
       finish,
     });
     part.mesh.material = material;
-    return { mesh: part.mesh as BakedPart['mesh'], material, light, normal: geometry.getAttribute('normal') };
+    const mesh = part.mesh as BakedPart['mesh'];
+    return { mesh, geometry, material, unlit, light };
   }
 
   /// Metalness and roughness of an original material.
@@ -127,8 +129,8 @@ export class BakedModel {
 
   dispose(): void {
     this.root.removeFromParent();
-    for (const { mesh, material } of this.parts) {
-      mesh.geometry.dispose();
+    for (const { geometry, material } of this.parts) {
+      geometry.dispose();
       (material.uniforms.arriving.value as Texture | null)?.dispose();
       material.dispose();
     }

@@ -46,7 +46,7 @@ export class Comparison {
   }
 
   private draw(width: number, height: number): void {
-    const { renderer, scene, camera } = this.stage;
+    const { renderer, camera } = this.stage;
     const split = Math.round(this.divider * width);
     renderer.setScissorTest(true);
     renderer.setScissor(0, 0, split, height);
@@ -55,7 +55,7 @@ export class Comparison {
     renderer.render(this.scene, camera);
     renderer.toneMappingExposure = own;
     renderer.setScissor(split, 0, width - split, height);
-    renderer.render(scene, camera);
+    this.stage.drawScene();
     renderer.setScissorTest(false);
   }
 

@@ -35,7 +35,7 @@ export class GridView {
   private surfaces: Shown | null = null;
   private boxes: Shown | null = null;
   private arrows: Shown | null = null;
-  private readonly unsubscribe: () => void;
+  private readonly unsubscribe: (() => void)[];
 
   constructor(
     private readonly viewer: Viewer,
@@ -43,7 +43,10 @@ export class GridView {
   ) {
     this.textures = new GridTextures(grid);
     this.ballMaterial = gridMaterial(this.textures, false);
-    this.unsubscribe = viewer.state.subscribe((state, changed) => this.apply(state, changed));
+    this.unsubscribe = [
+      viewer.state.subscribe((state, changed) => this.apply(state, changed)),
+      viewer.shown.subscribe(() => this.dressAnew()),
+    ];
     this.apply(viewer.state.get(), new Set<keyof ViewState>(['mode', 'ball', 'ballAt', 'cells', 'arrows']));
   }
 
@@ -54,6 +57,12 @@ export class GridView {
     if (changed.has('cells')) this.boxes = swap(this.boxes, state.cells, () => this.add(cellBoxes(this.grid)));
     if (changed.has('arrows')) this.arrows = swap(this.arrows, state.arrows, () => this.add(vertexArrows(this.grid)));
     this.viewer.stage.requestDraw();
+  }
+
+  /// Another level of detail has other meshes.
+  private dressAnew(): void {
+    this.surfaces?.dispose();
+    this.surfaces = swap(null, this.viewer.state.get().mode === 'grid', () => this.lightSurfaces());
   }
 
   /// The model's meshes with the grid's material in place of their own, seen from the sides they are seen from.
@@ -119,7 +128,7 @@ export class GridView {
   }
 
   dispose(): void {
-    this.unsubscribe();
+    for (const end of this.unsubscribe) end();
     this.showBall(false);
     for (const shown of [this.surfaces, this.boxes, this.arrows]) shown?.dispose();
     this.ballMaterial.dispose();

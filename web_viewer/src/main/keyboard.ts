@@ -5,7 +5,7 @@ import { kDefaultPose, type Stage } from './stage';
 import type { Store } from './store';
 import { kDefaultState, type Mode, type ViewState } from './view_state';
 
-const kModes: readonly Mode[] = ['shaded', 'light', 'measure', 'weighted', 'coefficient'];
+const kNumbered: readonly Mode[] = ['shaded', 'light', 'measure', 'weighted', 'coefficient'];
 const kOrbitStep = Math.PI / 36;
 
 export interface KeyActions {
@@ -28,7 +28,7 @@ export function listenToKeys(
 
   const changeState = (key: string): boolean => {
     const now = state.get();
-    const mode = kModes[Number(key) - 1];
+    const mode = kNumbered[Number(key) - 1];
     if (mode) state.set({ mode });
     else if (key === 'w') state.set({ wire: !now.wire });
     else if (key === 'b') state.set({ background: now.background === 'off' ? 'sky' : 'off' });

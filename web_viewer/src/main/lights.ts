@@ -82,6 +82,11 @@ export class Lights {
       : lightToEquirect(this.order, softened(this.order, this.coefficients(id)), kHarmonicsWidth);
   }
 
+  /// Of a job's own map neither formula nor harmonics are known beside radiosity.
+  hasPicture(id: string): boolean {
+    return id !== 'baked' || this.order > 0 || !this.bakedName || this.skyOf(id) !== undefined;
+  }
+
   /// The formula behind a light. A bake says only the name of its sky; it is believed when the coefficients agree.
   private skyOf(id: string): Sky | undefined {
     if (id !== 'baked') return kSkies.find((one) => one.id === id);

@@ -31,7 +31,7 @@ const kOrder = 6; // of the harmonics that stand for a dropped map
 const kOwnSky = 'studio'; // where the job names none; under an even sky nothing without shadows has a shape
 
 export class PlainModel {
-  readonly parts: { mesh: Mesh<BufferGeometry, Material | Material[]> }[] = [];
+  readonly parts: { mesh: Mesh<BufferGeometry, Material | Material[]>; geometry: BufferGeometry }[] = [];
   readonly bounds: Box3;
   readonly transfer = null;
   lamps = false;
@@ -40,7 +40,7 @@ export class PlainModel {
     root.updateMatrixWorld(true);
     this.bounds = new Box3().setFromObject(root);
     root.traverse((object) => {
-      if ((object as Mesh).isMesh) this.parts.push({ mesh: prepared(object as Mesh) });
+      if ((object as Mesh).isMesh) this.parts.push(prepared(object as Mesh));
       this.lamps ||= (object as Light).isLight === true;
     });
   }
@@ -60,12 +60,12 @@ export class PlainModel {
 }
 
 /// As a wireframe asks for it: with an index, and room for lines where it stands.
-function prepared(mesh: Mesh): Mesh {
+function prepared(mesh: Mesh): PlainModel['parts'][number] {
   const { geometry, material } = mesh;
   for (const one of [material].flat()) one.polygonOffsetFactor = one.polygonOffsetUnits = 1;
   if (!geometry.index)
     geometry.setIndex(Array.from({ length: geometry.getAttribute('position').count }, (_, vertex) => vertex));
-  return mesh;
+  return { mesh, geometry };
 }
 
 /// Applies a ViewState to a plain model, as Viewer does to a baked one. Owns what it is given.
@@ -189,7 +189,8 @@ export async function showPlain(
   announce('The model is shown');
 
   const help = helpDialog();
-  const panel = new ViewPanel(viewer, statistics(viewer, report), artifact(job, 'grid.exr') !== undefined);
+  const grid = artifact(job, 'grid.exr') !== undefined;
+  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels: [] });
   const actions = { screenshot: () => void saveScreenshot(stage, page.id), help: () => help.showModal() };
   page.main.append(panel.element);
   document.body.append(help);

@@ -41,9 +41,16 @@ export class Probe {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - left, event.clientY - top];
     this.ray.setFromCamera(new Vector2((2 * x) / width - 1, 1 - (2 * y) / height), camera);
+    if (!this.viewer.model.root.visible) return; // another mesh is shown: progressive_view.ts
     const meshes = this.viewer.model.parts.map((part) => part.mesh);
     const hit = this.ray.intersectObjects(meshes, false)[0];
-    if (hit) this.show(describe(hit), x, y, width);
+    if (hit) this.show(this.describe(hit), x, y, width);
+  }
+
+  private describe(hit: Intersection): string {
+    const { level, stage } = this.viewer;
+    const seen = level.field?.seenAt(hit, stage.camera.position);
+    return seen ? `Radiance ${seen.map((v) => v.toPrecision(3)).join(', ')} towards the eye` : describe(hit);
   }
 
   private show(text: string, x: number, y: number, width: number): void {

@@ -44,6 +44,8 @@ export class Stage {
   readonly controls: OrbitControls;
   /// Called in place of the plain draw when set (the comparison draws two halves).
   drawWith: ((width: number, height: number) => void) | null = null;
+  /// Called in place of a plain picture of the scene when set (a difference draws two and compares them).
+  drawModel: (() => void) | null = null;
   onDrawn: (() => void) | null = null;
   onMoved: (() => void) | null = null;
   private readonly box = new Box3();
@@ -80,8 +82,13 @@ export class Stage {
     this.fitPlanes();
     const { clientWidth, clientHeight } = this.canvas;
     if (this.drawWith) this.drawWith(clientWidth, clientHeight);
-    else this.renderer.render(this.scene, this.camera);
+    else this.drawScene();
     this.onDrawn?.();
+  }
+
+  drawScene(): void {
+    if (this.drawModel) this.drawModel();
+    else this.renderer.render(this.scene, this.camera);
   }
 
   /// Sets the driver to what the next picture needs. Without it that picture waits for one shader after the other.

@@ -9,10 +9,12 @@ import { announce, copyText, h, toast } from '../ui/dom';
 import { Divider } from '../ui/divider';
 import { helpDialog } from '../ui/help';
 import { LegendBox } from '../ui/legend';
+import { levelRows } from '../ui/levels';
 import { statistics } from '../ui/statistics';
 import { ViewPanel } from '../ui/view_panel';
 import { bindAddress } from './address';
 import { type KeyActions, listenToKeys, resetView } from './keyboard';
+import { fetchLevel, Level, levelsOf } from './level';
 import { Lights } from './lights';
 import type { Page } from './page';
 import { Probe } from './probe';
@@ -28,6 +30,8 @@ const kLegendTitles: Partial<Record<ViewState['mode'], string>> = {
   measure: 'Sum of |t − t′| over the edges',
   weighted: 'The same × √area',
   coefficient: 'Coefficient of the transfer vector',
+  vertexError: 'Per vertex against per pixel, parts of white',
+  levelError: 'This level against the finest, parts of white',
 };
 
 export interface Begun {
@@ -54,7 +58,10 @@ export async function show(page: Page, job: Job, begun: Begun): Promise<void> {
   pictures.prepare(state.get()); // while the worker decodes
   const asset = await parseGltf(await opened, size);
   performance.mark('kiln:decoded');
-  const viewer = await Viewer.open(stage, asset, state, { relighter, pictures });
+  const most = stage.renderer.capabilities.maxTextureSize;
+  const level = await Level.create(asset, relighter, most);
+  const viewer = await Viewer.open(stage, level, state, pictures);
+  viewer.openLevel = (index) => fetchLevel(job, index, most);
   page.onDispose(() => viewer.dispose());
   page.showCanvas();
   performance.mark('kiln:first-picture');
@@ -67,7 +74,9 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
   const { stage, state } = viewer;
   const { id, area, main } = page;
   const help = helpDialog();
-  const panel = new ViewPanel(viewer, statistics(viewer, report), artifact(job, 'grid.exr') !== undefined);
+  const levels = levelRows(levelsOf(job), report, viewer.model);
+  const grid = artifact(job, 'grid.exr') !== undefined;
+  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels });
   const divider = new Divider(area, state);
   const legend = new LegendBox();
   const probe = new Probe(area, viewer);
@@ -91,7 +100,7 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     () => divider.dispose(),
     () => probe.dispose(),
   );
-  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report)]).then(
+  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report), openProgressive(page, viewer)]).then(
     () => (document.documentElement.dataset.ready = 'true'),
   );
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
@@ -128,6 +137,15 @@ async function openLamp(page: Page, viewer: Viewer, report: Report | null): Prom
   } catch (error) {
     toast(`The lamp cannot be shown: ${(error as Error).message}`, 'error');
   }
+}
+
+/// A mesh at any level of detail, where the file has one.
+async function openProgressive(page: Page, viewer: Viewer): Promise<void> {
+  if (!viewer.progressive) return;
+  const { ProgressiveView } = await import('./progressive_view');
+  const view = new ProgressiveView(viewer, viewer.progressive);
+  page.onDispose(() => view.dispose());
+  Object.assign(window, { kilnProgressive: view });
 }
 
 /// Of the places where the certificate hung lamps.

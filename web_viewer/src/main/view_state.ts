@@ -4,7 +4,18 @@
 import type { CameraPose } from './stage';
 
 export type ToneMap = 'baked' | 'neutral' | 'aces' | 'none';
-export type Mode = 'shaded' | 'light' | 'measure' | 'weighted' | 'coefficient' | 'grid';
+export const kModes = [
+  'shaded',
+  'light',
+  'measure',
+  'weighted',
+  'coefficient',
+  'grid',
+  'vertices', // a light field evaluated at the vertices
+  'vertexError', // how far that is from evaluating it at each pixel
+  'levelError', // how far a level of detail is from the finest
+] as const;
+export type Mode = (typeof kModes)[number];
 export type Background = 'off' | 'sky' | 'harmonics';
 
 export interface ViewState {
@@ -19,6 +30,8 @@ export interface ViewState {
   mode: Mode;
   channel: number;
   slot: number;
+  level: number; // of detail; 0: the finest
+  detail: number; // share of a progressive mesh, see progressive_view.ts; 1: the file's own triangles
   ball: boolean; // of a grid: see grid_view.ts
   ballAt: readonly [number, number, number] | null; // from the middle of the grid, in its half extents
   cells: boolean;
@@ -44,6 +57,8 @@ export const kDefaultState: ViewState = {
   mode: 'shaded',
   channel: 0,
   slot: 0,
+  level: 0,
+  detail: 1,
   ball: true,
   ballAt: null,
   cells: false,
@@ -100,9 +115,11 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     tone: one<ToneMap>('tone', ['baked', 'neutral', 'aces', 'none']),
     background: one<Background>('background', ['off', 'sky', 'harmonics']),
     wire: flag('wire'),
-    mode: one<Mode>('mode', ['shaded', 'light', 'measure', 'weighted', 'coefficient', 'grid']),
+    mode: one<Mode>('mode', kModes),
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
+    level: Math.round(number('level', 0, 99)),
+    detail: number('detail', 0, 1),
     ball: flag('ball'),
     ballAt: placeIn(from.get('ballAt')),
     cells: flag('cells'),

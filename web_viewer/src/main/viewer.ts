@@ -5,23 +5,18 @@ import type { ValuesReply } from '../light/messages';
 import type { Relighter } from '../light/relighter';
 import { unshadowedLevel } from '../light/unshadowed';
 import { SkyBackground } from '../shaders/sky_background';
-import { BakedModel } from './baked_model';
+import type { BakedModel } from './baked_model';
 import { Comparison } from './comparison';
-import { HeatMap, type HeatMapData } from './heat_map';
+import type { Level } from './level';
 import type { Lights } from './lights';
 import type { SkyPictures } from './sky_pictures';
 import { kDefaultPose, type Stage } from './stage';
 import { Store } from './store';
+import { isFalseColour, type Legend, Surfaces } from './surfaces';
 import type { ViewState } from './view_state';
-import { Wireframe } from './wireframe';
-
-/// What the legend shows.
-export type Legend = Pick<HeatMapData, 'map' | 'range'> | null;
 
 export const kWellExposed = 0.877; // the bake's tone map shows it as 0.8 of white: its own target for bright surfaces
 const kOverexposed = 3 * kWellExposed;
-
-const isFalseColour = (mode: ViewState['mode']): boolean => mode !== 'shaded' && mode !== 'light' && mode !== 'grid';
 
 export class Viewer {
   onLegend: (legend: Legend) => void = () => {};
@@ -30,48 +25,46 @@ export class Viewer {
   onFailure: (message: string) => void = () => {};
   /// Called when the list of lights has grown.
   onLights: () => void = () => {};
+  /// Told what is shown of a progressive mesh.
+  onDetail: (text: string) => void = () => {};
   /// In place of the relighter's own question, while a lamp that moves is shown (lamp_view.ts).
   askLight: ((spare: Float32Array[]) => Promise<ValuesReply>) | null = null;
   private readonly background = new SkyBackground();
+  private readonly surfaces: Surfaces;
   private readonly unsubscribe: () => void;
   /// What the worker needed for the light that is shown.
   relitMilliseconds = 0;
-  private wireframe: Wireframe | null = null;
-  private heatMap: HeatMap | null = null;
   private comparison: Comparison | null = null;
   private comparisonAsked = false;
-  private spare: Float32Array[] = [];
   private relighting = false;
   private relightAgain = false;
-  private heatSerial = 0;
+  private levelSerial = 0;
+  /// The level on the screen. Who dresses its meshes listens.
+  readonly shown: Store<{ index: number; level: Level }>;
+  /// Loads another one; view.ts knows from where.
+  openLevel: (index: number) => Promise<Level> = () => Promise.reject(new Error('This job has no levels of detail.'));
   private disposed = false;
 
   private constructor(
     readonly stage: Stage,
-    readonly asset: LoadedAsset,
-    readonly model: BakedModel,
+    private readonly finest: Level,
     readonly state: Store<ViewState>,
-    readonly relighter: Relighter,
     private readonly pictures: SkyPictures,
   ) {
-    stage.scene.add(model.root, this.background.mesh);
-    stage.setBounds(model.bounds);
+    this.shown = new Store({ index: 0, level: finest });
+    this.surfaces = new Surfaces(stage, finest, this.background.mesh);
+    stage.scene.add(finest.model.root, this.background.mesh);
+    stage.setBounds(finest.model.bounds);
     this.setPose();
     this.unsubscribe = state.subscribe((_state, changed) => this.apply(changed));
   }
 
-  /// Resolves when the first light is on the screen. The viewer owns asset, relighter and pictures from then on.
-  static async open(
-    stage: Stage,
-    asset: LoadedAsset,
-    state: Store<ViewState>,
-    { relighter, pictures }: { relighter: Relighter; pictures: SkyPictures },
-  ): Promise<Viewer> {
-    const model = await BakedModel.create(asset);
-    const viewer = new Viewer(stage, asset, model, state, relighter, pictures);
+  /// Resolves when the first light is on the screen. The viewer owns level and pictures from then on.
+  static async open(stage: Stage, level: Level, state: Store<ViewState>, pictures: SkyPictures): Promise<Viewer> {
+    const viewer = new Viewer(stage, level, state, pictures);
     viewer.setLook();
     const lit = Promise.all([viewer.relightOnce(), viewer.measureLevel()]);
-    model.setWhite(state.get().mode === 'light');
+    viewer.surfaces.dress(level, state.get().mode);
     viewer.showSky();
     stage.compile(); // while the worker computes
     await lit;
@@ -82,8 +75,10 @@ export class Viewer {
 
   /// What the first picture did without, and the functions above tell of.
   complete(): void {
-    const { wire, mode, compare } = this.state.get();
+    const { wire, mode, compare, level } = this.state.get();
     const missing = new Set<keyof ViewState>();
+    if (this.finest.missing) this.onFailure(this.finest.missing);
+    if (level > 0) missing.add('level');
     if (wire) missing.add('wire');
     if (isFalseColour(mode)) missing.add('mode');
     if (compare !== null) missing.add('compare');
@@ -102,11 +97,29 @@ export class Viewer {
     if (has('light', 'rotation', 'intensity', 'lamps')) void this.relight();
     if (has('light')) void this.measureLevel();
     if (has('ev', 'tone')) this.setLook();
+    if (has('level')) void this.showLevel(state.level);
     if (has('mode', 'channel', 'slot')) void this.showMode(state);
-    if (has('wire')) this.showWire(state.wire);
+    if (has('wire', 'mode')) this.surfaces.showWire(this.level, state);
     if (has('compare')) void this.compare(state.compare);
     if (has('light', 'rotation', 'intensity', 'lamps', 'background', 'compare', 'mode')) this.showSky();
     this.stage.requestDraw();
+  }
+
+  get level(): Level {
+    return this.shown.get().level;
+  }
+
+  get model(): BakedModel {
+    return this.level.model;
+  }
+
+  get relighter(): Relighter {
+    return this.level.relighter;
+  }
+
+  /// Of the finest level, which has the original materials.
+  get asset(): LoadedAsset {
+    return this.finest.asset;
   }
 
   get lamps(): boolean {
@@ -115,7 +128,12 @@ export class Viewer {
 
   /// Of a file with links: where lamps that move must be seen from.
   get lampSamples(): Float32Array | null {
-    return this.relighter.samples;
+    return this.finest.relighter.samples;
+  }
+
+  /// Of a file with a progressive mesh: its bytes.
+  get progressive(): Uint8Array | null {
+    return this.finest.field && this.finest.relighter.progressive;
   }
 
   get lights(): Lights {
@@ -155,7 +173,7 @@ export class Viewer {
     const { light, ev, tone } = this.state.get();
     const [baked, now] = [this.lights.levels.get('baked') ?? 0, this.lights.levels.get(light) ?? 0];
     const ratio = light !== 'baked' && baked > 0 && now > 0 ? baked / now : 1;
-    const exposure = (this.model.transfer.look?.exposure ?? 1) * ratio;
+    const exposure = (this.finest.model.transfer.look?.exposure ?? 1) * ratio; // levels change nothing
     this.exposeComparison(light, exposure);
     this.stage.setLook(exposure * 2 ** ev, tone);
   }
@@ -170,46 +188,63 @@ export class Viewer {
   }
 
   private async relightOnce(): Promise<void> {
-    const { light, rotation, intensity, lamps } = this.state.get();
-    const reply = this.askLight
-      ? await this.askLight(this.spare)
-      : await this.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, this.spare);
-    this.spare = this.model.setLight(reply.values);
-    this.model.setArriving(reply.arriving);
-    this.relitMilliseconds = reply.milliseconds;
+    const levels = this.state.get().mode === 'levelError' ? [this.level, this.finest] : [this.level];
+    for (const level of new Set(levels)) await this.relightLevel(level);
     this.stage.requestDraw();
   }
 
-  private async showMode({ mode, channel, slot }: Readonly<ViewState>): Promise<void> {
-    const serial = ++this.heatSerial;
+  private async relightLevel(level: Level): Promise<void> {
+    const { light, rotation, intensity, lamps } = this.state.get();
+    const spare = level.spare;
+    level.spare = []; // an array is given away once
+    const reply = this.askLight
+      ? await this.askLight(spare)
+      : await level.relighter.relight(this.lights.turned(light, rotation, intensity), lamps, spare);
+    level.spare = level.model.setLight(reply.values);
+    level.model.setArriving(reply.arriving);
+    this.relitMilliseconds = reply.milliseconds;
+  }
+
+  /// The level that is shown stays until the other one is lit. A request that is overtaken comes to nothing.
+  private async showLevel(index: number): Promise<void> {
+    const serial = ++this.levelSerial;
+    if (index === this.shown.get().index) return;
+    let level: Level | null = null;
     try {
-      const data = isFalseColour(mode) ? await this.heatData(mode, channel, slot) : null;
-      if (serial !== this.heatSerial || this.disposed) return;
-      this.heatMap?.dispose();
-      this.heatMap = data && new HeatMap(this.model, data);
-      this.model.setWhite(mode === 'light');
-      this.onLegend(data);
+      level = index === 0 ? this.finest : await this.openLevel(index);
+      if (serial === this.levelSerial && !this.disposed) await this.relightLevel(level);
+    } catch (error) {
+      if (level !== this.finest) level?.dispose();
+      if (serial !== this.levelSerial) return;
+      this.fail(error);
+      this.state.set({ level: this.shown.get().index });
+      return;
+    }
+    if (serial === this.levelSerial && !this.disposed) this.swapLevel(index, level);
+    else if (level !== this.finest) level.dispose();
+  }
+
+  private swapLevel(index: number, level: Level): void {
+    const before = this.level;
+    this.surfaces.strip(before);
+    before.model.root.removeFromParent();
+    this.stage.scene.add(level.model.root);
+    this.shown.set({ index, level });
+    if (before !== this.finest) before.dispose();
+    if (level.missing) this.onFailure(level.missing);
+    this.apply(new Set<keyof ViewState>(['mode', 'wire']));
+  }
+
+  private async showMode(state: Readonly<ViewState>): Promise<void> {
+    try {
+      if (state.mode === 'levelError') await this.relightLevel(this.finest);
+      const legend = await this.surfaces.show(this.level, state);
+      if (legend === undefined || this.disposed) return;
+      this.onLegend(legend);
       this.stage.requestDraw();
     } catch (error) {
       this.fail(error);
     }
-  }
-
-  private async heatData(mode: ViewState['mode'], channel: number, slot: number): Promise<HeatMapData> {
-    if (mode === 'coefficient') {
-      const { values, range } = await this.relighter.coefficient(
-        channel,
-        Math.min(slot, this.model.transfer.slots - 1),
-      );
-      return { per: 'vertex', values, map: 'diverging', range: [-range, range] };
-    }
-    const { values, range } = await this.relighter.measure(mode === 'weighted');
-    return { per: 'triangle', values, map: 'viridis', range: [0, range] };
-  }
-
-  private showWire(wire: boolean): void {
-    this.wireframe?.dispose();
-    this.wireframe = wire ? new Wireframe(this.model) : null;
   }
 
   private async compare(divider: number | null): Promise<void> {
@@ -241,7 +276,8 @@ export class Viewer {
 
   private showSky(): void {
     const { light, background, rotation, intensity, lamps, mode } = this.state.get();
-    const plain = background === 'off' || (isFalseColour(mode) && !this.comparison); // a scale is read against grey
+    const grey = isFalseColour(mode) && !this.comparison; // a scale is read against it
+    const plain = background === 'off' || grey || !this.lights.hasPicture(light);
     const shown = plain ? null : this.pictures.background(light, background === 'harmonics');
     this.background.show(shown, rotation, intensity);
     if (this.comparison)
@@ -250,7 +286,7 @@ export class Viewer {
 
   /// Reads a .hdr or .exr and makes it the light.
   async useFile(file: File): Promise<void> {
-    const { light, map } = await this.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
+    const { light, map } = await this.finest.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
     this.lights.addFile(file.name, light, map);
     this.pictures.dispose();
     this.onLights();
@@ -259,18 +295,17 @@ export class Viewer {
   }
 
   private fail(error: unknown): void {
+    if (error instanceof DOMException && error.name === 'AbortError') return; // its level is gone
     if (!this.disposed) this.onFailure(error instanceof Error ? error.message : String(error));
   }
 
   dispose(): void {
     this.disposed = true;
     this.unsubscribe();
-    this.relighter.dispose();
     this.comparison?.dispose();
-    this.heatMap?.dispose();
-    this.wireframe?.dispose();
+    this.surfaces.strip(this.level);
     this.background.dispose();
     this.pictures.dispose();
-    this.model.dispose();
+    for (const level of new Set([this.level, this.finest])) level.dispose();
   }
 }

@@ -4,9 +4,9 @@
 
 import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type Material, type Mesh } from 'three';
 
-/// What a wireframe stands on: indexed meshes.
+/// What a wireframe stands on, and the triangles it shows: indexed ones.
 export interface Wired {
-  parts: readonly { mesh: Mesh<BufferGeometry, Material | Material[]> }[];
+  parts: readonly { mesh: Mesh<BufferGeometry, Material | Material[]>; geometry: BufferGeometry }[];
 }
 
 export class Wireframe {
@@ -20,11 +20,11 @@ export class Wireframe {
   private readonly moved = new Set<Material>();
 
   constructor(private readonly model: Wired) {
-    this.lines = model.parts.map(({ mesh }) => {
-      const geometry = new BufferGeometry();
-      geometry.setAttribute('position', mesh.geometry.getAttribute('position'));
-      geometry.setIndex(new BufferAttribute(edgesOf(mesh.geometry.index!.array), 1));
-      const lines = new LineSegments(geometry, this.material);
+    this.lines = model.parts.map(({ mesh, geometry }) => {
+      const edges = new BufferGeometry();
+      edges.setAttribute('position', geometry.getAttribute('position'));
+      edges.setIndex(new BufferAttribute(edgesOf(geometry.index!.array), 1));
+      const lines = new LineSegments(edges, this.material);
       mesh.add(lines);
       mesh.onBeforeRender = (_renderer, _scene, _camera, _geometry, material) => {
         material.polygonOffset = true;

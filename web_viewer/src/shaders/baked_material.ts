@@ -196,9 +196,9 @@ export interface BakedLook {
   finish: Finish | null; // it has matrices
 }
 
-const uvOf = (map: Texture): string => (map.channel === 1 ? 'uv1' : 'uv');
+export const uvOf = (map: Texture): string => (map.channel === 1 ? 'uv1' : 'uv');
 
-const transformOf = (map?: Texture | null): Matrix3 => {
+export const transformOf = (map?: Texture | null): Matrix3 => {
   if (!map) return new Matrix3();
   if (map.matrixAutoUpdate) map.updateMatrix();
   return map.matrix;
@@ -245,7 +245,7 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, fin
   });
 }
 
-const sides = ({ side, transparent, depthWrite }: Material) => ({
+export const sides = ({ side, transparent, depthWrite }: Material) => ({
   side,
   transparent,
   depthWrite,

@@ -1,6 +1,6 @@
 // The scale of a false-colour picture.
 
-import type { Legend } from '../main/viewer';
+import type { Legend } from '../main/surfaces';
 import { paintScale } from '../shaders/colour_maps';
 import { h } from './dom';
 

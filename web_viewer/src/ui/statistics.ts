@@ -15,6 +15,7 @@ interface Counted {
     triangles: number;
     transfer: Pick<StoredTransfer, 'order' | 'channels' | 'fixed' | 'slots' | 'units'> | null;
   };
+  level?: { field: { degree: number; bytes: number } | null };
 }
 
 export function statistics(viewer: Counted, report: Report | null): HTMLElement {
@@ -22,6 +23,8 @@ export function statistics(viewer: Counted, report: Report | null): HTMLElement 
   if (!report) return box;
   if (report.certificate?.relrmse !== undefined)
     box.append(h('h3', {}, 'Certificate'), certificate(report.certificate, report.error_sources));
+  if (report.lightfield && viewer.level?.field)
+    box.append(h('h3', {}, 'Light field'), pairs(lightField(viewer.level.field, report.lightfield)));
   if (report.reduce) box.append(h('h3', {}, 'Reduction'), pairs(reduction(report.reduce, report)));
   if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
   if (report.links) box.append(h('h3', {}, 'Links'), pairs(links(report.links)));
@@ -88,6 +91,17 @@ function certificate(c: NonNullable<Report['certificate']>, from: Report['error_
     h('p', { class: 'headline' }, h('strong', {}, percent(c.relrmse)), ` relative error${interval(c.interval)}`),
     pairs(rows),
   );
+}
+
+/// Its certificate has eyes all around.
+function lightField(field: { degree: number; bytes: number }, of: NonNullable<Report['lightfield']>): Row[] {
+  const { certificate: c } = of;
+  return [
+    ['Degree', `${field.degree}: ${(field.degree + 1) ** 2} × RGB a vertex`],
+    ['On the graphics card', bytes(field.bytes)],
+    ...(c ? [['Relative error towards random eyes', withInterval(c)] as const] : []),
+    ...(c?.points ? [['measured at', `${count(c.points)} points, ${count(c.samples)} paths each`] as const] : []),
+  ];
 }
 
 /// Distances in parts of the diagonal of the model's box.

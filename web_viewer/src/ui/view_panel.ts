@@ -6,6 +6,7 @@ import type { Store } from '../main/store';
 import type { ViewState } from '../main/view_state';
 import { Controls } from './controls';
 import { h, toast } from './dom';
+import { type LevelRow, levelSlider } from './levels';
 
 const kDegrees = (value: number) => `${Math.round(value)}°`;
 
@@ -17,6 +18,9 @@ export interface Shown {
   readonly lampSamples?: Float32Array | null; // the file has links for lamps that move
   readonly asset: { hasOriginal: boolean };
   readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
+  readonly level?: { field: unknown }; // null: the model has no light field
+  readonly progressive?: Uint8Array | null; // the file has a progressive mesh
+  onDetail?: (text: string) => void;
   onLights: () => void;
   useFile(file: File): Promise<void>;
 }
@@ -31,7 +35,7 @@ export class ViewPanel {
   constructor(
     private readonly viewer: Shown,
     statistics: HTMLElement,
-    private readonly hasGrid: boolean,
+    private readonly has: { grid: boolean; levels: readonly LevelRow[] },
   ) {
     this.controls = new Controls(viewer.state);
     this.element = h(
@@ -47,9 +51,7 @@ export class ViewPanel {
   private light(): HTMLElement[] {
     const { controls, viewer } = this;
     if (viewer.lights.order === 0)
-      return viewer.lampSamples
-        ? this.lamp()
-        : [h('p', {}, `${viewer.lights.choices[0].label}. Radiosity is the light of the bake and cannot be changed.`)];
+      return viewer.lampSamples ? this.lamp() : [h('p', {}, `${viewer.lights.choices[0].label}. ${this.unchangeable}`)];
     const picker = controls.select('light', 'Environment', () => viewer.lights.choices);
     viewer.onLights = picker.refill;
     const file = h('input', { type: 'file', id: 'environment-file', accept: '.hdr,.exr' });
@@ -64,6 +66,11 @@ export class ViewPanel {
     return out;
   }
 
+  private get unchangeable(): string {
+    const what = this.viewer.level?.field ? 'A light field' : 'Radiosity';
+    return `${what} is the light of the bake and cannot be changed.`;
+  }
+
   private lamp(): HTMLElement[] {
     const { controls } = this;
     return [
@@ -76,7 +83,7 @@ export class ViewPanel {
 
   async useFile(file: File): Promise<void> {
     try {
-      if (this.viewer.lights.order === 0) throw new Error('Radiosity is the light of the bake and cannot be changed.');
+      if (this.viewer.lights.order === 0) throw new Error(this.unchangeable);
       await this.viewer.useFile(file);
       toast(`${file.name} lights the scene`);
     } catch (error) {
@@ -117,7 +124,14 @@ export class ViewPanel {
       { id: 'weighted', label: 'Where to refine, by area' },
       { id: 'coefficient', label: 'One coefficient' },
     ];
-    if (this.hasGrid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
+    const [hasField, hasLevels] = [Boolean(viewer.level?.field), this.has.levels.length > 1];
+    if (hasField) {
+      modes[0].label = 'Light field, at each pixel';
+      modes.splice(1, 0, { id: 'vertices', label: 'Light field, at the vertices' });
+      modes.push({ id: 'vertexError', label: 'What the vertices miss of it' });
+    }
+    if (hasLevels) modes.push({ id: 'levelError', label: 'What this level of detail misses' });
+    if (this.has.grid) modes.push({ id: 'grid', label: 'Light of the grid, white surface' });
     if (!viewer.model.transfer) return this.showPlain();
     const { channels, slots } = viewer.model.transfer;
     const slot = h(
@@ -131,8 +145,10 @@ export class ViewPanel {
     return [
       controls.select('mode', 'Surface', () => modes).element,
       slot,
+      ...(hasLevels ? [levelSlider(controls, this.has.levels)] : []),
+      ...(viewer.progressive ? this.detail() : []),
       controls.checkbox('wire', 'Wireframe'),
-      ...(this.hasGrid ? this.grid() : []),
+      ...(this.has.grid ? this.grid() : []),
       compareSwitch(viewer, controls),
     ];
   }
@@ -153,6 +169,15 @@ export class ViewPanel {
     return [controls.checkbox('wire', 'Wireframe'), surface, compare, why];
   }
 
+  private detail(): HTMLElement[] {
+    const { controls, viewer } = this;
+    const text = h('p', { class: 'hint', id: 'detail-text' });
+    viewer.onDetail = (what) => (text.textContent = what);
+    const show = (share: number) => (share === 1 ? 'all' : share.toFixed(2));
+    const play = h('button', { type: 'button', onclick: () => playDetail(viewer.state) }, 'Play from coarse to fine');
+    return [controls.slider('detail', 'Progressive mesh', { min: 0, max: 1, step: 0.002, show }), play, text];
+  }
+
   private grid(): HTMLElement[] {
     const { controls } = this;
     return [
@@ -164,9 +189,26 @@ export class ViewPanel {
 
   dispose(): void {
     this.viewer.onLights = () => {};
+    this.viewer.onDetail = () => {};
     this.controls.dispose();
     this.element.remove();
   }
+}
+
+const kPlaySeconds = 6;
+
+/// Until it is done or somebody else moves the slider.
+function playDetail(state: Store<ViewState>): void {
+  const start = performance.now();
+  let last = 0;
+  state.set({ detail: last });
+  const step = () => {
+    if (state.get().detail !== last) return;
+    last = Math.min(1, (performance.now() - start) / (1000 * kPlaySeconds));
+    state.set({ detail: last });
+    if (last < 1) requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
 }
 
 function slotName({ order }: Pick<StoredTransfer, 'order'>, controls: Controls): HTMLElement {

@@ -1,0 +1,175 @@
+// KILN_light_field: radiance towards every eye, as reflected radiance functions (r-RFs) at the vertices.
+//   radiance[c] = max(0, sum_k weight[k] sum_i r-RF_k[c][i] Y_i(r)),   r = 2 (n.w) n - w    (Vanhoey et al. 2015, eq. 8)
+// k: the corners of a triangle, n: the interpolated normal, w: the way to the eye, raised to the horizon of n where it
+// is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
+//
+// A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
+// c; what is left over follows, all of red first. 16 bytes a texel: 160 a vertex at degree 4, 304 at 6, 496 at 8.
+
+import { coefficientsOf } from '../light/transfer';
+import { evaluateSh } from '../light/sh';
+import { componentRows, type StoredTransfer } from './kiln_reader';
+
+/// The root extension, as written.
+export interface LightFieldExtension {
+  version: number;
+  basis: string;
+  condonShortley: boolean;
+  reflected: boolean;
+  degree: number;
+  form: 'raw' | 'components';
+  components?: { rank: number; bufferView: number };
+  attributes: string[];
+  scale: number[];
+  offset: number[];
+}
+
+/// r-RFs of the vertices of one primitive.
+export interface FieldTexels {
+  degree: number;
+  halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(degree) of each vertex
+  unit: number; // a coefficient is unit * half; a power of two
+}
+
+const kName = 'KILN_light_field';
+const kMostDegree = 8;
+const kBatch = 4096; // vertices that are decoded together
+const kLargestHalf = 65504;
+
+export const fieldCount = (degree: number): number => (degree + 1) ** 2;
+
+/// Texels of a vertex.
+export const texelsOf = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
+
+/// Which half of a vertex is coefficient `i` of channel `c`.
+export function halfAt(degree: number, i: number, c: number): number {
+  const rest = fieldCount(degree) % 8;
+  const grouped = fieldCount(degree) - rest;
+  return i < grouped ? 24 * (i >> 3) + 8 * c + (i & 7) : 3 * grouped + c * rest + i - grouped;
+}
+
+/// The extension of a glTF; undefined: it has no light field. Throws, with the JSON pointer, on what it does not know.
+export function readLightField(json: unknown): LightFieldExtension | undefined {
+  const e = (json as { extensions?: Record<string, unknown> }).extensions?.[kName] as LightFieldExtension | undefined;
+  if (e) checkField(e);
+  return e;
+}
+
+function checkField(e: LightFieldExtension): void {
+  const must = (good: boolean, member: keyof LightFieldExtension, what: string) => {
+    if (!good) throw new Error(`/extensions/${kName}/${member}: ${what}`);
+  };
+  must(e.version === 1, 'version', `only version 1 is read, this is ${e.version}`);
+  const basis = e.basis === 'real-sh' && e.condonShortley === false;
+  must(basis, 'basis', 'must be real-sh without the Condon-Shortley phase');
+  must(e.reflected === true, 'reflected', 'radiance functions must be reflected');
+  must(Number.isInteger(e.degree) && e.degree >= 0 && e.degree <= kMostDegree, 'degree', 'must be 0 to 8');
+  must(e.form === 'raw' || e.form === 'components', 'form', 'must be raw or components');
+  const slots = 3 * fieldCount(e.degree);
+  const rank = e.form === 'raw' ? slots : (e.components?.rank ?? 0);
+  must(Number.isInteger(rank) && rank >= 1 && rank <= slots, 'components', `the rank must be 1 to ${slots}`);
+  const names = Array.from({ length: Math.ceil(rank / 4) }, (_, k) => `_SLF_${k}`);
+  must(`${e.attributes}` === `${names}`, 'attributes', `must be _SLF_0 and on, ${names.length} of them`);
+  for (const list of ['scale', 'offset'] as const)
+    must(e[list]?.length === rank && e[list].every(Number.isFinite), list, `must be ${rank} numbers`);
+}
+
+/// What the stored numbers mean, as if they were transfer vectors. `bytesIn`: of a buffer view.
+export function storedField(
+  e: LightFieldExtension,
+  bytesIn: (view: number) => Uint8Array<ArrayBuffer>,
+): StoredTransfer {
+  const order = e.degree + 1;
+  const shape = { ...e, version: 2, order, channels: 3 as const, fixed: false, slots: order * order };
+  if (e.form === 'raw') return { ...shape, components: undefined, rows: new Float32Array(0) };
+  return { ...shape, rows: componentRows(shape, bytesIn(e.components!.bufferView).slice().buffer) };
+}
+
+/// `attributes`: the `_SLF_k` of a primitive. Components are expanded, once: rank * 3 (degree + 1)^2 products a vertex.
+/// Throws on what is not finite.
+export function fieldTexels(field: StoredTransfer, attributes: readonly Float32Array[]): FieldTexels {
+  const degree = field.order - 1;
+  const stride = 3 * field.slots;
+  const vertices = attributes[0].length / 4;
+  const out = emptyTexels(degree, vertices, largestOf(field));
+  const write = texelWriter(out);
+  for (let first = 0; first < vertices; first += kBatch) {
+    const numbers = coefficientsOf(field, attributes.map((all) => all.subarray(4 * first, 4 * (first + kBatch))));
+    for (let from = 0, v = first; from < numbers.length; from += stride, ++v) write(v, numbers, from);
+  }
+  return out;
+}
+
+/// Zeros, for coefficients of at most `largest`.
+export function emptyTexels(degree: number, vertices: number, largest: number): FieldTexels {
+  const unit = 2 ** Math.ceil(Math.log2((largest || 1) / kLargestHalf));
+  return { degree, halves: new Uint16Array(8 * texelsOf(degree) * vertices), unit };
+}
+
+/// Writes the coefficients of a vertex, those of red first, which stand at `from` of `numbers`.
+export function texelWriter({ degree, halves, unit }: FieldTexels) {
+  const [count, width] = [fieldCount(degree), 8 * texelsOf(degree)];
+  const places = Array.from({ length: 3 * count }, (_, s) => halfAt(degree, s % count, Math.floor(s / count)));
+  return (vertex: number, numbers: Float32Array, from: number): void => {
+    for (let s = 0; s < places.length; ++s) halves[width * vertex + places[s]] = halfOf(numbers[from + s] / unit);
+  };
+}
+
+/// No coefficient is larger: stored numbers lie in [-1, 1].
+function largestOf({ scale, offset, rows, components }: StoredTransfer): number {
+  const numbers = scale.map((s, j) => Math.abs(s) + Math.abs(offset[j]));
+  if (!components) return Math.max(...numbers);
+  const slots = rows.length / (components.rank + 1);
+  const ofSlot = (s: number) =>
+    numbers.reduce((sum, number, k) => sum + number * Math.abs(rows[(k + 1) * slots + s]), Math.abs(rows[s]));
+  return Math.max(...Array.from({ length: slots }, (_, s) => ofSlot(s)));
+}
+
+const one = new Float32Array(1);
+const bits = new Uint32Array(one.buffer);
+
+/// The nearest half float (IEEE 754 binary16); the largest one for what is beyond it.
+export function halfOf(value: number): number {
+  if (!Number.isFinite(value)) throw new Error(`${kName}: a number of a vertex is not finite`);
+  one[0] = value;
+  const sign = (bits[0] >>> 16) & 0x8000;
+  const size = bits[0] & 0x7fffffff;
+  if (size >= 0x477ff000) return sign | 0x7bff;
+  if (size < 0x38800000) return sign | Math.round(Math.abs(one[0]) * 2 ** 24); // subnormal
+  return sign | ((size - 0x38000000 + 0xfff + ((size >>> 13) & 1)) >>> 13);
+}
+
+export function numberOfHalf(half: number): number {
+  const [exponent, mantissa] = [(half >> 10) & 31, half & 1023];
+  const size = exponent === 0 ? mantissa * 2 ** -24 : (1024 + mantissa) * 2 ** (exponent - 25);
+  return half & 0x8000 ? -size : size;
+}
+
+type Vector = readonly [number, number, number];
+const dot = (a: Vector, b: Vector): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/// Where r-RFs are looked up for an eye, see above. `normal` and `view` are unit, the view points to the eye.
+export function reflectedView(normal: Vector, view: Vector): Vector {
+  const above = dot(normal, view);
+  const raised = view.map((x, a) => x - Math.min(0, above) * normal[a]);
+  const size = Math.hypot(...raised);
+  return normal.map((n, a) => 2 * Math.max(0, above) * n - (size > 0 ? raised[a] / size : n)) as unknown as Vector;
+}
+
+/// Radiance that an eye sees between three vertices: (8). `weights` are barycentric.
+export function seenRadiance(
+  field: FieldTexels,
+  corners: Vector,
+  weights: Vector,
+  normal: Vector,
+  view: Vector,
+): number[] {
+  const y = new Float64Array(fieldCount(field.degree));
+  evaluateSh(field.degree + 1, ...reflectedView(normal, view), y);
+  const width = 8 * texelsOf(field.degree);
+  const along = (vertex: number, c: number) =>
+    y.reduce((sum, yi, i) => sum + yi * numberOfHalf(field.halves[width * vertex + halfAt(field.degree, i, c)]), 0);
+  return [0, 1, 2].map((c) =>
+    Math.max(0, field.unit * corners.reduce((sum, vertex, k) => sum + weights[k] * along(vertex, c), 0)),
+  );
+}

@@ -1,0 +1,104 @@
+// The model under its light field: other geometry and materials in place of the baked ones, while they are shown.
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  type Intersection,
+  type Material,
+  type Mesh,
+  type ShaderMaterial,
+  type Texture,
+  Vector3,
+} from 'three';
+import { type FieldTexels, seenRadiance } from '../asset/light_field';
+import { fieldMaterial, fieldTexture } from '../shaders/field_material';
+import type { BakedModel, BakedPart } from './baked_model';
+
+export type Evaluation = 'fragment' | 'vertex';
+
+interface Dressed {
+  mesh: Mesh<BufferGeometry, Material>;
+  own: { geometry: BufferGeometry; material: Material };
+  split: BufferGeometry;
+  texture: Texture;
+  materials: Record<Evaluation, ShaderMaterial>;
+  field: FieldTexels;
+}
+
+/// Owns what it makes of the field, and nothing of the model.
+export class FieldLook {
+  readonly degree: number;
+  readonly bytes: number; // of its textures
+  private readonly parts: Dressed[];
+
+  /// `most`: texels that a texture may have across. Throws where a part needs more.
+  constructor(model: BakedModel, field: readonly FieldTexels[], most: number) {
+    this.degree = field[0].degree;
+    this.bytes = field.reduce((sum, { halves }) => sum + halves.byteLength, 0);
+    this.parts = model.parts.map((part, i) => dress(part, field[i], most));
+  }
+
+  /// null: the model's own look, where nobody else has put another on it.
+  show(evaluation: Evaluation | null): void {
+    for (const { mesh, own, split, materials } of this.parts) {
+      if (evaluation) [mesh.geometry, mesh.material] = [split, materials[evaluation]];
+      else if (mesh.geometry === split) mesh.geometry = own.geometry;
+      if (!evaluation && Object.values<Material>(materials).includes(mesh.material)) mesh.material = own.material;
+    }
+  }
+
+  /// Radiance towards an eye from where a ray has hit; undefined: the field is not shown there.
+  seenAt({ object, faceIndex, barycoord, point }: Intersection, eye: Vector3): number[] | undefined {
+    const part = this.parts.find(({ mesh, split }) => mesh === object && mesh.geometry === split);
+    if (!part) return undefined;
+    const { index, attributes } = part.own.geometry;
+    const corners = [0, 1, 2].map((k) => index!.getX(3 * faceIndex! + k)) as [number, number, number];
+    const weights = barycoord!.toArray();
+    const normal = new Vector3();
+    corners.forEach((v, k) =>
+      normal.addScaledVector(new Vector3().fromBufferAttribute(attributes.normal, v), weights[k]),
+    );
+    const view = eye.clone().sub(point).normalize();
+    return seenRadiance(part.field, corners, weights, normal.normalize().toArray(), view.toArray());
+  }
+
+  dispose(): void {
+    this.show(null);
+    for (const { split, texture, materials } of this.parts) {
+      split.dispose();
+      texture.dispose();
+      for (const material of Object.values(materials)) material.dispose();
+    }
+  }
+}
+
+function dress({ mesh, geometry, material, unlit }: BakedPart, field: FieldTexels, most: number): Dressed {
+  const own = { geometry, material };
+  const texture = fieldTexture(field, most);
+  const vertexAlbedo = own.geometry.hasAttribute('_albedo');
+  const surface = { degree: field.degree, texture, unit: field.unit, unlit, vertexAlbedo };
+  const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
+  return { mesh, own, split: splitTriangles(own.geometry), texture, materials, field };
+}
+
+const kKept = ['position', 'normal', 'uv', 'uv1', '_albedo'];
+
+/// Three vertices of its own for each triangle, each with the numbers of all three corners.
+function splitTriangles(geometry: BufferGeometry): BufferGeometry {
+  const indices = geometry.index!.array;
+  const out = new BufferGeometry();
+  for (const name of kKept) {
+    if (!geometry.hasAttribute(name)) continue;
+    const { array, itemSize } = geometry.getAttribute(name) as BufferAttribute;
+    const values = new Float32Array(itemSize * indices.length);
+    for (let i = 0; i < indices.length; ++i)
+      for (let c = 0; c < itemSize; ++c) values[itemSize * i + c] = array[itemSize * indices[i] + c];
+    out.setAttribute(name, new BufferAttribute(values, itemSize));
+  }
+  const corners = new Uint32Array(3 * indices.length);
+  for (let i = 0; i < corners.length; ++i) corners[i] = indices[3 * Math.floor(i / 9) + (i % 3)];
+  out.setAttribute('corners', new BufferAttribute(corners, 3));
+  out.boundingSphere = geometry.boundingSphere;
+  out.boundingBox = geometry.boundingBox;
+  return out;
+}
