@@ -252,3 +252,12 @@ test('numbers outside their range are moved to its end', () => {
 });
 
 test('a hundred coefficients exist at order 10', () => assert.equal(shCount(10), 100));
+
+test('of a radiosity job’s own map there is no picture; of a named sky, of no sky and of harmonics there is', async () => {
+  const { Lights } = await load('main/lights.ts');
+  const pictured = (order, name) => new Lights({ order, light: { name, coefficients: [] } }).hasPicture('baked');
+  assert.deepEqual(
+    [pictured(0, 'courtyard.hdr'), pictured(0, 'clear'), pictured(0, ''), pictured(4, 'courtyard.hdr')],
+    [false, true, true, true],
+  );
+});

@@ -21,15 +21,33 @@ export function coefficientsOf(transfer: StoredTransfer, attributes: readonly Fl
   if (!components) return numbers;
   const [stride, count] = [channels * slots, transfer.scale.length];
   const out = new Float32Array((numbers.length / count) * stride);
+  const sums = new Float64Array(stride);
   for (let to = 0, from = 0; to < out.length; to += stride, from += count) {
-    for (let s = 0; s < stride; ++s) {
-      let sum = rows[s];
-      for (let k = 0; k < components.rank; ++k) sum += numbers[from + k] * rows[(k + 1) * stride + s];
-      out[to + s] = sum;
-    }
+    for (let s = 0; s < stride; ++s) sums[s] = rows[s];
+    for (let k = 0; k < components.rank; k += kTogether) addRows(sums, numbers, from + k, rows, k, components.rank);
+    out.set(sums, to);
     if (fixed) for (let c = 0; c < channels; ++c) out[to + (c + 1) * slots - 1] = numbers[from + components.rank + c];
   }
   return out;
+}
+
+const kTogether = 4; // rows that are added in one pass: nearly twice as fast as one sum after the other
+
+/// Adds rows k .. k + 3 below `rank`, by the numbers at `from`.
+function addRows(
+  sums: Float64Array,
+  numbers: Float32Array,
+  from: number,
+  rows: Float32Array,
+  k: number,
+  rank: number,
+): void {
+  const stride = sums.length;
+  const weight = (i: number) => (k + i < rank ? numbers[from + i] : 0);
+  const row = (i: number) => (k + i < rank ? k + i + 1 : 0) * stride;
+  const [a, b, c, d] = [weight(0), weight(1), weight(2), weight(3)];
+  const [p, q, r, t] = [row(0), row(1), row(2), row(3)];
+  for (let s = 0; s < stride; ++s) sums[s] += a * rows[p + s] + b * rows[q + s] + c * rows[r + s] + d * rows[t + s];
 }
 
 /// offset + scale * stored of every number, those of a vertex together. The last attribute may be padded.

@@ -22,7 +22,7 @@ interface Dressed {
   split: BufferGeometry;
   texture: Texture;
   materials: Record<Evaluation, ShaderMaterial>;
-  field: FieldTexels;
+  texels: FieldTexels;
 }
 
 /// Owns what it makes of the field, and nothing of the model.
@@ -59,7 +59,7 @@ export class FieldLook {
       normal.addScaledVector(new Vector3().fromBufferAttribute(attributes.normal, v), weights[k]),
     );
     const view = eye.clone().sub(point).normalize();
-    return seenRadiance(part.field, corners, weights, normal.normalize().toArray(), view.toArray());
+    return seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray());
   }
 
   dispose(): void {
@@ -74,11 +74,11 @@ export class FieldLook {
 
 function dress({ mesh, geometry, material, unlit }: BakedPart, field: FieldTexels, most: number): Dressed {
   const own = { geometry, material };
-  const texture = fieldTexture(field, most);
+  const { texture, texels } = fieldTexture(field, most);
   const vertexAlbedo = own.geometry.hasAttribute('_albedo');
   const surface = { degree: field.degree, texture, unit: field.unit, unlit, vertexAlbedo };
   const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
-  return { mesh, own, split: splitTriangles(own.geometry), texture, materials, field };
+  return { mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
 }
 
 const kKept = ['position', 'normal', 'uv', 'uv1', '_albedo'];

@@ -45,6 +45,7 @@ export class Level {
     if (!relighter.field) return;
     try {
       this.field = new FieldLook(model, relighter.field, most);
+      relighter.field = null; // the look has its own
     } catch (error) {
       this.missing = (error as Error).message;
     }

@@ -95,11 +95,11 @@ class ProgressiveShape {
     this.base = this.mesh.vertexCount;
     const light = this.mesh.columns.get('coefficients')!;
     const all = light.values.length / light.width;
-    this.texels = emptyTexels(this.mesh.degree, all, this.mesh.largest('coefficients'));
+    const empty = emptyTexels(this.mesh.degree, all, this.mesh.largest('coefficients'));
+    ({ texture: this.texture, texels: this.texels } = fieldTexture(empty, stage.renderer.capabilities.maxTextureSize));
     const write = texelWriter(this.texels);
     for (let v = 0; v < all; ++v) write(v, light.values, light.width * v);
     this.mesh.touched.clear();
-    this.texture = fieldTexture(this.texels, stage.renderer.capabilities.maxTextureSize);
     this.parts = model.parts.map((part, i) => this.makePart(part, i));
     for (const { mesh } of this.parts) this.group.add(mesh);
     this.group.matrixAutoUpdate = false;
@@ -116,16 +116,10 @@ class ProgressiveShape {
     mesh.goTo(all > base ? ((mesh.levels - 1) * (wanted - base)) / (all - base) : 0);
     const write = texelWriter(texels);
     for (const v of mesh.touched) write(v, light.values, light.width * v);
-    if (mesh.touched.size > 0) this.upload();
+    if (mesh.touched.size > 0) this.texture.needsUpdate = true;
     mesh.touched.clear();
     for (const part of this.parts) part.mesh.material = part.materials[perVertex ? 1 : 0];
     this.fill();
-  }
-
-  private upload(): void {
-    const data = this.texture.image.data as Uint32Array;
-    new Uint16Array(data.buffer).set(this.texels.halves);
-    this.texture.needsUpdate = true;
   }
 
   /// Three vertices of its own for each triangle, as field_material.ts asks for.

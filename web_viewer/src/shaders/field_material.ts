@@ -11,8 +11,10 @@ import { type FieldTexels, fieldCount, halfAt, texelsOf } from '../asset/light_f
 import { sides, transformOf, uvOf } from './baked_material';
 import { harmonicsCode } from './harmonics_code';
 
-/// r-RFs as a texture; no vertex is split between two rows. Throws where it would be larger than `most` texels across.
-export function fieldTexture({ degree, halves }: FieldTexels, most: number): DataTexture {
+/// r-RFs as a texture, and the same r-RFs in its own memory, so that nobody need keep the first ones. No vertex is split
+/// between two rows. Throws where it would be larger than `most` texels across.
+export function fieldTexture(field: FieldTexels, most: number): { texture: DataTexture; texels: FieldTexels } {
+  const { degree, halves } = field;
   const texels = texelsOf(degree);
   const perRow = Math.floor(most / texels);
   const vertices = halves.length / (8 * texels);
@@ -20,13 +22,12 @@ export function fieldTexture({ degree, halves }: FieldTexels, most: number): Dat
   if (rows > most)
     throw new Error(`The light field of ${vertices} vertices is larger than a texture may be here (${most}²).`);
   const [width, height] = rows === 1 ? [Math.max(1, vertices) * texels, 1] : [perRow * texels, rows];
-  const data = new Uint16Array(8 * width * height);
-  data.set(halves);
-  const pairs = new Uint32Array(data.buffer);
-  const texture = new DataTexture(pairs, width, height, RGBAIntegerFormat, UnsignedIntType);
+  const own = new Uint16Array(8 * width * height);
+  own.set(halves);
+  const texture = new DataTexture(new Uint32Array(own.buffer), width, height, RGBAIntegerFormat, UnsignedIntType);
   texture.internalFormat = 'RGBA32UI';
   texture.needsUpdate = true;
-  return texture;
+  return { texture, texels: { ...field, halves: own } };
 }
 
 /// radianceSeen(corners, weights, n, v): both unit, v towards the eye.
