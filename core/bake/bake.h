@@ -26,8 +26,8 @@ struct BakeInput {
   std::string spill_folder = ".";  // where a reduction puts aside what does not fit into memory
 };
 
-/// Named files with their media types: scene.glb, lod1.glb and on and grid.exr where the recipe asks for them, preview.png (a
-/// reduction leaves it out where memory does not allow it), report.json, log.txt.
+/// Named files with their media types: scene.glb, lod1.glb and on and grid.exr where the recipe asks for them,
+/// preview.png (a reduction leaves it out where memory does not allow it), report.json, log.txt.
 struct ArtifactFile {
   std::string name;
   std::string media_type;

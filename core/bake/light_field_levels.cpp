@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "core/lightfield/hemisphere_norm.h"
 #include "core/lightfield/progressive_mesh.h"
 #include "core/mesh/closest_point.h"
+#include "core/mesh/topology.h"
 
 namespace kiln {
 namespace {
@@ -38,6 +41,34 @@ class NearestLight {
   ClosestPoint nearest_;
 };
 
+/// On the grid of the file: corners that only rounding holds apart are one.
+Mesh on_grid(Mesh mesh) {
+  constexpr float kSteps = (1 << 20) - 1;  // Encoding::position_bits
+  for (Vec3f& p : mesh.position) {
+    for (std::size_t k = 0; k < 3; ++k) p[k] = std::round((p[k] + 0.5F) * kSteps) / kSteps - 0.5F;
+  }
+  return mesh;
+}
+
+/// Root mean square of a field over its mean: simplify() counts in parts of the first, certificates of the second.
+double rms_over_mean(const Mesh& mesh, const LightField& field) {
+  const HemisphereNorm norm(field.degree);
+  const std::size_t count = field.count();
+  std::vector<double> area(mesh.position.size());
+  for (const Triangle& t : mesh.triangles) {
+    for (const std::uint32_t v : t) area[v] += triangle_area(mesh, t);
+  }
+  double squares = 0, mean = 0, all = 0;
+  for (std::size_t v = 0; v < area.size(); ++v) {
+    const std::span<const float> c = field.of(v);
+    const std::vector<double> rgb(c.begin(), c.end());
+    squares += area[v] * squared_norm(norm, to_double(mesh.normal[v]), rgb) / 3;
+    mean += area[v] * (rgb[0] + rgb[count] + rgb[2 * count]) / (3 * 2 * std::sqrt(std::numbers::pi));
+    all += area[v];
+  }
+  return mean > 0 && all > 0 ? std::sqrt(squares / all) / (mean / all) : 1;
+}
+
 std::size_t coarser(const FieldLevel& level, std::size_t times) {
   return std::max<std::size_t>(4, level.mesh.triangles.size() / times);
 }
@@ -47,16 +78,18 @@ std::size_t coarser(const FieldLevel& level, std::size_t times) {
 FieldLevels make_levels(const Mesh& mesh, const Transfer& transfer, LightField field, const FieldPlan& plan,
                         BakeLog& log, Threads& threads) {
   const NearestLight light(mesh, transfer);
+  const double unit = rms_over_mean(mesh, field);
   FieldLevels out;
-  SimplifyResult last{.lit = {mesh, std::move(field)}, .reached = true};
+  SimplifyResult last{.lit = {on_grid(mesh), std::move(field)}, .reached = true};
   double squares = 0;
   const auto add_level = [&] {
-    squares += last.error * last.error;
+    squares += std::pow(last.error * unit, 2);
     out.levels.push_back(
         {last.lit.mesh, last.lit.field, light.at(last.lit.mesh, threads), std::sqrt(squares), last.reached});
   };
   if (plan.simplify) {
     Simplify params = *plan.simplify;
+    params.max_error /= unit;
     if (plan.ratio)
       params.triangles = static_cast<std::size_t>(*plan.ratio * static_cast<double>(mesh.triangles.size()));
     last = simplify(std::move(last.lit), params, threads);

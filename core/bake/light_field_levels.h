@@ -17,7 +17,7 @@ struct FieldLevel {
   Mesh mesh;
   LightField field;
   Transfer transfer;    // diffuse light of its vertices, read from the nearest place of the baked surface
-  double estimate = 0;  // of what simplification added, of all steps up to here
+  double estimate = 0;  // relRMSE that simplification added, of all steps up to here
   bool reached = true;  // the asked number of triangles
 };
 

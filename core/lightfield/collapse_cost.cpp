@@ -58,7 +58,8 @@ CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Col
     even_ = kEvenness / (unit * area);
     light_ = light > 0 ? (1 - geometry_weight) / light : 0;  // mean |L|^2 is light / area
   }
-  quadric_.resize(mesh.points()), area_.resize(mesh.points()), gram_.resize(lit.mesh.position.size());
+  quadric_.resize(mesh.points()), area_.resize(mesh.points()), seams_.resize(mesh.points()),
+      gram_.resize(lit.mesh.position.size());
 }
 
 void CollapseCost::update_point(std::uint32_t p) {
@@ -76,13 +77,20 @@ void CollapseCost::update_point(std::uint32_t p) {
     for (const std::uint32_t x : {mesh_.point(a), mesh_.point(b)})
       if (std::ranges::find(neighbours, x) == neighbours.end()) neighbours.push_back(x);
   });
+  seams_[p].clear();
   if (mesh_.kind(p) != PointKind::free) {
+    const Mesh& mesh = mesh_.mesh();
     for (const std::uint32_t x : neighbours) {
       if (mesh_.kind(x) == PointKind::free) continue;
       const Vec3d other = mesh_.position(x);
       const EdgeSides sides = mesh_.sides(p, x);
       const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
       if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
+      if (!sides.crease || sides.triangles != 2 || sides.from[0] == sides.from[1]) continue;
+      const LightField& field = mesh_.lit().field;
+      const Vec3d normal = normalized(to_double(mesh.normal[sides.from[0]]));
+      const double jump = squared_distance(norm_, normal, field.of(sides.from[0]), field.of(sides.from[1]));
+      seams_[p].push_back({x, static_cast<float>(jump)});
     }
   }
   quadric_[p] = q, area_[p] = area;
@@ -130,6 +138,16 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
   return sum;
 }
 
+double CollapseCost::seam_error(std::uint32_t p, std::uint32_t other, const Vec3d& place) const {
+  const Vec3d from = mesh_.position(p);
+  double sum = 0;
+  for (const Seam& seam : seams_[p]) {
+    if (seam.to == other) continue;
+    sum += double{seam.jump} * 0.5 * length(cross(place - from, mesh_.position(seam.to) - from));
+  }
+  return sum;
+}
+
 void CollapseCost::find_cost(CollapsePlan& plan) const {
   const Vec3d place = to_double(plan.place), edge = mesh_.position(plan.kept) - mesh_.position(plan.gone);
   const Quadric q = quadric_[plan.gone] + quadric_[plan.kept];
@@ -146,6 +164,10 @@ void CollapseCost::find_cost(CollapsePlan& plan) const {
     mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
       if (plan.moves && !plan.sides.takes(w)) light += light_error(w, SurfacePoints::kNone, 0, place);
     });
+  }
+  if (light_ > 0) {
+    light += seam_error(plan.gone, plan.kept, place);
+    if (plan.moves) light += seam_error(plan.kept, plan.gone, place);
   }
   plan.cost = geometry_ * q.at(place) + light_ * light;
   plan.order = plan.cost + even_ * (area_[plan.gone] + area_[plan.kept]) * dot(edge, edge);

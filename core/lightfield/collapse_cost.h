@@ -1,6 +1,7 @@
 #pragma once
 // What an edge collapse costs: the change of the light that leaves the surface, and of its shape.
 //   E = sum over changed triangles t of area(t) d^2(L(p0), L_t(p0))                                                 (7)
+//     + sum over seams (p, x) of a point that moves of area(p, p', x) d^2(L on one side of it, L on the other) (7a)
 //   Q = sum over triangles around the edge of area x squared distance from their planes, and borders as lines
 //   cost = (geometry_weight Q / u^2 + (1 - geometry_weight) E / mean |L|^2) / area of the surface
 // L_t(p0) is extrapolated (4): weights of t's corners that sum to one. So d^2 is a quadratic form in those weights
@@ -50,7 +51,14 @@ class CollapseCost {
     std::vector<std::uint32_t> ring;  // neighbours of a vertex
     std::vector<float> product;       // of neighbours i >= k: i (i + 1) / 2 + k
   };
+  /// A seam from a point to the next, and squared distance of the lights on its sides.
+  struct Seam {
+    std::uint32_t to = 0;
+    float jump = 0;
+  };
   void find_cost(CollapsePlan&) const;
+  /// (7a) of p, when it moves to `place` and `other` goes with it.
+  double seam_error(std::uint32_t p, std::uint32_t other, const Vec3d& place) const;
   /// Of the triangles around v, when v at `place` has the light (1 - share) v + share w. w may be kNone: then that of
   /// v.
   double light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
@@ -61,6 +69,7 @@ class CollapseCost {
   double geometry_ = 0, light_ = 0, even_ = 0;  // factors of Q, of E and of area x squared length
   std::vector<Quadric> quadric_;                // of points
   std::vector<double> area_;                    // around points
+  std::vector<std::vector<Seam>> seams_;        // of points
   std::vector<Gram> gram_;                      // of vertices
 };
 

@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/progressive_glb.h"
+#include "core/bake/light_field_levels.h"
 #include "core/lightfield/seen.h"
 #include "tests/core/bake/bake_input.h"
 
@@ -77,6 +79,47 @@ TEST(LightFieldBake, ThreadCountChangesNotOneByteOfTheScene) {
   const BakeOutput one = baked("room", recipe, 1), three = baked("room", recipe, 3);
   EXPECT_EQ(file(one, "scene.glb"), file(three, "scene.glb"));
   EXPECT_EQ(file(one, "lod1.glb"), file(three, "lod1.glb"));
+}
+
+TEST(LightFieldBake, ASeamThatOnlyRoundingHoldsOpenDoesNotTear) {
+  // Two halves of a strip, whose common edge is 1e-9 apart.
+  Mesh mesh;
+  LightField field{.degree = 0, .coefficients = {}};
+  for (std::uint32_t half = 0; half < 2; ++half) {
+    for (std::uint32_t i = 0; i < 20; ++i) {
+      for (std::uint32_t j = 0; j < 5; ++j) {
+        const float x = half == 0 ? -0.1F * static_cast<float>(4 - j) : 0.1F * static_cast<float>(j) + 1e-9F;
+        mesh.position.push_back({x, 0.02F * std::sin(static_cast<float>(i)), -0.4F + 0.04F * static_cast<float>(i)});
+        mesh.normal.push_back({0, 1, 0});
+        for (int c = 0; c < 3; ++c) field.coefficients.push_back(1 + 0.3F * std::sin(0.9F * static_cast<float>(i + c)));
+        if (i == 0 || j == 0) continue;
+        const std::uint32_t v = 100 * half + 5 * i + j;
+        mesh.triangles.push_back({v - 6, v - 1, v - 5});
+        mesh.triangles.push_back({v - 5, v - 1, v});
+      }
+    }
+  }
+  mesh.part.assign(mesh.triangles.size(), 0);
+  Threads threads(1);
+  BakeLog log({});
+  log.begin("simplify", 1);
+  const Transfer light{0, 3, true, std::vector<float>(3 * mesh.position.size(), 1.0F)};
+  FieldPlan plan;
+  plan.simplify.emplace(Simplify{.triangles = 60});
+  const FieldLevels made = make_levels(mesh, light, field, plan, log, threads);
+  const Mesh& out = made.levels.front().mesh;
+  EXPECT_LE(out.triangles.size(), 60U);
+  // Along the common edge both halves have the same places.
+  std::set<float> sides[2];
+  for (const Triangle& t : out.triangles) {
+    float middle = 0;
+    for (const std::uint32_t v : t) middle += out.position[v].x;
+    for (const std::uint32_t v : t) {
+      if (std::abs(out.position[v].x) < 1e-5F) sides[middle > 0].insert(out.position[v].z);
+    }
+  }
+  EXPECT_EQ(sides[0], sides[1]);
+  EXPECT_GE(sides[0].size(), 2U);
 }
 
 TEST(LightFieldBake, DarknessIsDarkAndHasNoError) {
