@@ -56,7 +56,8 @@ Environment IncidentLight::blurred_sky() const {
       Vec3d sum;
       double all = 0;
       for (int i = 0; i < parts * parts; ++i) {
-        const double v = (y + (i / parts + 0.5) / parts) / out.height, u = (x + (i % parts + 0.5) / parts) / out.width;
+        const int row = i / parts, column = i % parts;
+        const double v = (y + (row + 0.5) / parts) / out.height, u = (x + (column + 0.5) / parts) / out.width;
         const double up = std::numbers::pi * (0.5 - v), around = 2 * std::numbers::pi * (u - 0.5);
         const Vec3d w{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)};
         sum += to_double(balanced_sky(to_float(w))) * std::cos(up);
