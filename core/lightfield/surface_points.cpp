@@ -21,7 +21,7 @@ std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corne
 
 void drop_bad_triangles(Mesh& mesh, const std::vector<std::uint32_t>& place) {
   const auto turned = [](Triangle t) {  // the least vertex first
-    std::ranges::rotate(t, std::ranges::min_element(t));
+    std::rotate(t.begin(), std::ranges::min_element(t), t.end());
     return t;
   };
   std::vector<std::uint32_t> order(mesh.triangles.size());
