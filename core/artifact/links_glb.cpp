@@ -7,12 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/glb.h"
+#include "core/artifact/glb_extension.h"
 #include "core/artifact/gltf_bytes.h"
 #include "core/artifact/gltf_check.h"
-#include "core/artifact/gltf_container.h"
-#include "core/artifact/gltf_load.h"
 #include "core/artifact/json_fields.h"
-#include "core/artifact/json_scan.h"
 #include "core/base/expects.h"
 
 namespace kiln {
@@ -202,22 +200,11 @@ LightLinks links_in(const Fields& fields, const gltf::BufferBytes& bytes, std::s
 }
 
 LightLinks read_file(std::span<const std::uint8_t> file, std::size_t vertices, Findings& findings) {
-  const GltfContainer container = open_glb(file, findings);
-  if (findings.failed()) return {};
-  scan_json(container.json, {}, findings);
-  if (findings.failed()) return {};
-  const nlohmann::json document = nlohmann::json::parse(container.json.begin(), container.json.end(), nullptr, false);
-  if (document.is_discarded()) {
-    findings.fail("json_invalid", "The text is not JSON.");
-    return {};
-  }
-  const Fields root(document, "", findings);
-  if (!root.has_extension(kName)) return {};
-  const gltf::Document parsed = gltf::load_document(container.json, findings);
-  if (findings.failed()) return {};
-  const gltf::BufferBytes bytes = gltf::load_bytes(parsed, container, {}, {}, findings);
-  if (findings.failed()) return {};
-  return links_in(root.extension(kName), bytes, vertices, findings);
+  LightLinks out;
+  read_root_extension(file, kName, findings, [&](const Fields& extension, const gltf::BufferBytes& bytes) {
+    out = links_in(extension, bytes, vertices, findings);
+  });
+  return out;
 }
 
 }  // namespace

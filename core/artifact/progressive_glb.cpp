@@ -4,11 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/glb.h"
-#include "core/artifact/gltf_bytes.h"
-#include "core/artifact/gltf_container.h"
-#include "core/artifact/gltf_load.h"
-#include "core/artifact/json_fields.h"
-#include "core/artifact/json_scan.h"
+#include "core/artifact/glb_extension.h"
 
 namespace kiln {
 namespace {
@@ -18,30 +14,17 @@ constexpr const char* kPlace = "/extensions/KILN_progressive_mesh";
 
 /// The extension's bytes; empty where there is none.
 Bytes bytes_in(std::span<const std::uint8_t> file, Findings& findings) {
-  const GltfContainer container = open_glb(file, findings);
-  if (!findings.failed()) scan_json(container.json, {}, findings);
-  if (findings.failed()) return {};
-  const nlohmann::json document = nlohmann::json::parse(container.json.begin(), container.json.end(), nullptr, false);
-  if (document.is_discarded()) {
-    findings.fail("json_invalid", "The text is not JSON.");
-    return {};
-  }
-  const Fields root(document, "", findings);
-  if (!root.has_extension(kName)) return {};
-  const Fields extension = root.extension(kName);
-  if (extension.count("version", 0) != 1)
-    findings.fail("unsupported_version", "Only version 1 of the extension is read.", extension.pointer("version"));
-  const int view = extension.index("bufferView", 1U << 30);
-  const gltf::Document parsed = gltf::load_document(container.json, findings);
-  if (findings.failed()) return {};
-  const gltf::BufferBytes bytes = gltf::load_bytes(parsed, container, {}, {}, findings);
-  if (findings.failed()) return {};
-  if (view < 0 || static_cast<std::size_t>(view) >= bytes.views.size()) {
-    findings.fail("index_out_of_range", "There is no such buffer view.", extension.pointer("bufferView"));
-    return {};
-  }
-  const auto found = bytes.views[static_cast<std::size_t>(view)];
-  return {found.begin(), found.end()};
+  Bytes out;
+  read_root_extension(file, kName, findings, [&](const Fields& extension, const gltf::BufferBytes& bytes) {
+    if (extension.count("version", 0) != 1)
+      findings.fail("unsupported_version", "Only version 1 of the extension is read.", extension.pointer("version"));
+    const int view = extension.index("bufferView", 1U << 30);
+    if (view < 0 || static_cast<std::size_t>(view) >= bytes.views.size())
+      return findings.fail("index_out_of_range", "There is no such buffer view.", extension.pointer("bufferView"));
+    const auto found = bytes.views[static_cast<std::size_t>(view)];
+    out.assign(found.begin(), found.end());
+  });
+  return out;
 }
 
 }  // namespace

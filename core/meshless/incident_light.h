@@ -31,10 +31,11 @@ class IncidentLight {
   };
   struct Rays {
     int count = 0;
-    double density = 0;    // per solid angle
-    bool direct = true;    // emitters, sky and punctual lights too; else only what surfaces reflect
-    bool blurred = false;  // rays see the sky averaged over their share of directions (Krivanek and Colbert 2008): for
-                           // sums that do not resolve single rays, whose noise finer detail would be
+    double density = 0;  // per solid angle
+    bool direct = true;  // emitters, sky and punctual lights too; else only what surfaces reflect
+    /// Rays see the sky averaged over their share of directions (Krivanek and Colbert 2008): for sums that do not
+    /// resolve single rays, to whom finer detail is noise.
+    bool blurred = false;
   };
   /// References of the world must outlive it.
   IncidentLight(const World&, const Rays&, std::uint64_t seed);

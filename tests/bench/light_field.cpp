@@ -1,6 +1,6 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
-//   kiln_light_field all MODELS                          the tables of core/lightfield/README.md; MODELS is
-//   shared/models kiln_light_field scale VERTICES [DEGREE] [RATIO]     time and memory of one simplification
+//   kiln_light_field all MODELS                        the tables of core/lightfield/README.md; MODELS: shared/models
+//   kiln_light_field scale VERTICES [DEGREE] [RATIO]   time and memory of one simplification
 #include <sys/resource.h>
 
 #include <array>
