@@ -60,6 +60,7 @@ Outcome<BakedScene> load_artefact(const std::string& path) {
   }
   Result<BakedScene> baked = read_baked_glb(bytes);
   if (!baked && baked.error().where.empty()) baked.error().where = base_name(path);
+  if (baked) decode_pixels(baked->scene);
   return or_failure(std::move(baked));
 }
 

@@ -25,6 +25,10 @@ LightFieldStage::LightFieldStage(BakedScene& baked, OutgoingLight outgoing, Plan
   outcome_.noise = outgoing.noise;
   outcome_.baked_triangles = baked.scene.mesh.triangles.size();
   outcome_.baked_vertices = baked.scene.mesh.position.size();
+  if (outgoing.field.has_sky()) {
+    baked.sky = std::move(outgoing.sky);
+    baked.lobes = make_lobe_table(1);
+  }
   log.begin("simplify", 0.9);
   levels_ = make_levels(surface_.mesh, baked.transfer, std::move(outgoing.field), *plan.field, log, threads);
   const FieldLevel& first = levels_.levels.front();
@@ -62,6 +66,7 @@ Result<FieldOutcome> LightFieldStage::finish(Bytes& glb, const BakedScene& decod
     encoding.field = choose_field_encoding(level.field, level.scene.mesh, plan_);
     KILN_TRY(file, write_baked_glb(level, encoding));
     KILN_TRY(shown, read_baked_glb(file));
+    shown.scene.images = decoded.scene.images;
     judge(shown, file.size(), outcome_.levels[k]);
     outcome_.lods.push_back(std::move(file));
     threads.check();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "core/artifact/stored_transfer.h"
@@ -82,6 +83,7 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   f.outgoing.degree = step.degree.value_or(effort.degree);
   f.outgoing.rays = step.rays.value_or(effort.rays);
   f.outgoing.seed = recipe.seed;
+  f.outgoing.sky_apart = std::getenv("KILN_NOSKY") == nullptr && sky != nullptr && f.outgoing.degree >= 2;
   f.storage = effort.storage;
   const std::string asked = "asked for by the recipe";
   if (!step.surface.subdivide.triangles) {

@@ -27,12 +27,11 @@ double squared_diagonal(const std::vector<Vec3f>& position) {
 std::vector<double> differences(const LightField& field, std::uint32_t v, const std::vector<std::uint32_t>& ring) {
   const std::size_t count = field.count(), columns = 3 * ring.size();
   std::vector<double> out(count * columns);
-  const float* own = field.of(v).data();
+  const std::vector<double> own = mean_light(field, v);
   for (std::size_t i = 0; i < ring.size(); ++i) {
-    const float* other = field.of(ring[i]).data();
+    const std::vector<double> other = mean_light(field, ring[i]);
     for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < count; ++k)
-        out[k * columns + 3 * i + c] = static_cast<double>(other[c * count + k]) - own[c * count + k];
+      for (std::size_t k = 0; k < count; ++k) out[k * columns + 3 * i + c] = other[c * count + k] - own[c * count + k];
   }
   return out;
 }
@@ -47,9 +46,7 @@ CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Col
   for (const Triangle& t : lit.mesh.triangles) {
     const double share = triangle_area(lit.mesh, t) / 3;
     for (const std::uint32_t v : t) {
-      const auto c = lit.field.of(v);
-      const std::vector<double> rgb(c.begin(), c.end());
-      light += share * squared_norm(norm_, normalized(to_double(lit.mesh.normal[v])), rgb);
+      light += share * squared_norm(norm_, normalized(to_double(lit.mesh.normal[v])), mean_light(lit.field, v));
     }
   }
   if (area > 0) {
@@ -89,7 +86,10 @@ void CollapseCost::update_point(std::uint32_t p) {
       if (!sides.crease || sides.triangles != 2 || sides.from[0] == sides.from[1]) continue;
       const LightField& field = mesh_.lit().field;
       const Vec3d normal = normalized(to_double(mesh.normal[sides.from[0]]));
-      const double jump = squared_distance(norm_, normal, field.of(sides.from[0]), field.of(sides.from[1]));
+      std::vector<double> across = mean_light(field, sides.from[0]);
+      const std::vector<double> side = mean_light(field, sides.from[1]);
+      for (std::size_t i = 0; i < across.size(); ++i) across[i] -= side[i];
+      const double jump = squared_norm(norm_, normal, across);
       seams_[p].push_back({x, static_cast<float>(jump)});
     }
   }

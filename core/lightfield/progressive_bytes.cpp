@@ -16,7 +16,7 @@ static_assert(std::endian::native == std::endian::little, "the bytes are little 
 static_assert(sizeof(Vec3f) == 12 && sizeof(Vec2f) == 8 && sizeof(Vec4f) == 16 && sizeof(Triangle) == 12);
 
 constexpr std::uint32_t kMagic = 0x4D504B31;  // "1KPM"
-constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16;
+constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16, kHasSky = 32;
 
 struct Header {
   std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
@@ -46,6 +46,7 @@ void each_array(Progressive& p, Splits& splits, const Header& h, const Visit& vi
     if (h.has & kHasColor) visit(lit.mesh.color, count);
     if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
     visit(lit.field.coefficients, 3 * count * static_cast<std::size_t>(sh_count(static_cast<int>(h.degree) + 1)));
+    if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
   };
   vertices_of(p.all, h.vertices);
   visit(p.all.mesh.triangles, h.triangles);
@@ -68,7 +69,7 @@ bool all_finite(const LitMesh& lit) {
     finite = finite && std::all_of(first, first + count, [](float x) { return std::isfinite(x); });
   };
   each_attribute(lit.mesh, check);
-  check(lit.field.coefficients);
+  each_field_array(lit.field, [&](const auto& array, std::size_t) { check(array); });
   return finite;
 }
 
@@ -131,7 +132,7 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
 std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
   const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
-           .has = attributes_of(p.all.mesh),
+           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0),
            .base_vertices = p.base_vertices,
            .base_triangles = p.base_triangles,
            .vertices = size(p.all.mesh.position),
@@ -163,7 +164,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   Header h;
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
-  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 31)
+  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 63)
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
     return fault("slot_count_mismatch", "The base is larger than the whole.", "header");

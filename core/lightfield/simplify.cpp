@@ -23,7 +23,9 @@ class Simplifier {
         mesh_(lit_, points_),
         cost_(mesh_, params.geometry_weight, params.collapse),
         age_(mesh_.points(), 0) {
-    if (params.record) out_.record.before = {.mesh = {}, .field = {.degree = lit_.field.degree, .coefficients = {}}};
+    if (params.record)
+      out_.record.before = {.mesh = {},
+                            .field = {.degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}}};
   }
 
   SimplifyResult run() {
