@@ -6,6 +6,7 @@
 
 #include "core/artifact/stored_transfer.h"
 #include "core/bake/radiosity_step.h"
+#include "core/lightfield/polynomial_space.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -92,6 +93,9 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
         d.reason = effort.reason + std::string(" adds triangles where direct light, colour or finish change");
     }
   }
+  f.basis = step.basis;
+  if (f.basis == RadianceBasis::polynomials)
+    decide(plan, "basis", "polynomial", asked + ": even in the height above the surface, kept as harmonics");
   decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
   decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
          (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
@@ -140,6 +144,8 @@ OutgoingLight bake_light_field(const IncidentLight::World& world, std::span<cons
   params.progress = [&](std::uint64_t done, std::uint64_t all) { log.advance(done, all); };
   OutgoingLight out = bake_outgoing(world, value, params, threads);
   log.count_rays(out.rays);
+  if (plan.field->basis == RadianceBasis::polynomials)
+    keep_polynomials(out.field, world.tracer.scene().mesh.normal, threads);
   return out;
 }
 

@@ -30,6 +30,7 @@ struct Decision {
 /// What the step `lightfield` will do beside `radiosity`, or instead where the file carries its light.
 struct FieldPlan {
   bool carried = false;
+  RadianceBasis basis = RadianceBasis::harmonics;  // of the fit
   OutgoingBake outgoing;
   double storage = 0.01;             // relRMSE that components and rounding may add
   std::optional<Simplify> simplify;  // what the delivered scene goes through

@@ -232,7 +232,8 @@ ordered_json radiosity_parameters(const Plan& plan) {
 }
 
 ordered_json field_parameters(const FieldPlan& field) {
-  ordered_json out = {{"degree", field.outgoing.degree}};
+  ordered_json out = {{"basis", field.basis == RadianceBasis::harmonics ? "sh" : "polynomial"},
+                      {"degree", field.outgoing.degree}};
   if (!field.carried) out["rays"] = field.outgoing.rays;
   out["storage"] = field.storage;
   return out;
