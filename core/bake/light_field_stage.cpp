@@ -37,6 +37,8 @@ LightFieldStage::LightFieldStage(BakedScene& baked, OutgoingLight outgoing, Plan
              (first.reached ? "" : "; topology or shape allow no fewer"));
   encoding_ = choose_field_encoding(first.field, first.mesh, plan);
   outcome_.rank = encoding_.components.rank();
+  if (levels_.progressive) progressive_ = encode_progressive(*levels_.progressive, encoding_.components.rows);
+  levels_.progressive.reset();
   for (std::size_t k = 0; k < levels_.levels.size(); ++k)
     outcome_.levels.push_back(report_of(levels_.levels[k], k == 0 ? "scene.glb" : "lod" + std::to_string(k) + ".glb"));
   put_level(levels_.levels.front(), baked);
@@ -55,9 +57,9 @@ Result<FieldOutcome> LightFieldStage::finish(Bytes& glb, const BakedScene& decod
                             ? certify_carried({shown, job.surface.mesh, *job.carried, job.recipe.seed}, threads)
                             : certify_field({shown, *truth, job.environment, log.rays(), job.recipe.seed}, threads);
   };
-  if (!levels_.progressive.empty()) {
-    outcome_.progressive_bytes = levels_.progressive.size();
-    KILN_TRY(with, add_progressive(glb, levels_.progressive));
+  if (!progressive_.empty()) {
+    outcome_.progressive_bytes = progressive_.size();
+    KILN_TRY(with, add_progressive(glb, progressive_));
     glb = std::move(with);
   }
   judge(decoded, glb.size(), outcome_.levels.front());

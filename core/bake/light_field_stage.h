@@ -60,6 +60,7 @@ class LightFieldStage {
   Scene surface_;
   FieldLevels levels_;
   TransferEncoding encoding_;
+  Bytes progressive_;  // KILN_progressive_mesh, if asked
   FieldOutcome outcome_;
 };
 
