@@ -52,6 +52,11 @@ Outcome<Scene> load_scene(const std::string& path) {
   return or_failure(import_scene(files));
 }
 
+Outcome<LitScene> load_lit_scene(const std::string& path) {
+  KILN_TRY(files, load_files(path));
+  return or_failure(import_lit_scene(files));
+}
+
 Outcome<BakedScene> load_artefact(const std::string& path) {
   KILN_TRY(bytes, read_file(path));
   if (kind_of(bytes) != FileKind::artefact) {

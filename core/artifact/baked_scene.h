@@ -63,7 +63,7 @@ Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
 /// Images come encoded; decode_pixels fills in their pixels.
 /// Fails with not_a_baked_scene, unsupported_version, slot_count_mismatch, attribute_missing, draco_damaged,
 /// accessor_count_mismatch, or as import_scene does.
-Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file, const std::string& name = "scene.glb");
 
 /// Decodes the images that base colour, emission and metallic-roughness textures name. One that cannot be decoded keeps
 /// empty pixels.

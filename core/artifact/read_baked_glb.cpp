@@ -422,8 +422,8 @@ void decode_pixels(Scene& scene) {
   }
 }
 
-Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file) {
-  Findings findings("scene.glb");
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file, const std::string& name) {
+  Findings findings(name);
   BakedScene out = read_file(file, findings);
   if (findings.failed()) return tl::make_unexpected(findings.fault());
   return out;

@@ -23,7 +23,7 @@ namespace kiln {
 inline constexpr int kMaxLightFieldDegree = 8;
 
 /// How much of the sky a place sees in a direction, limited to [0, 1]: harmonics in world axes.
-inline constexpr int kVisibilityOrder = 5;
+inline constexpr int kVisibilityOrder = 3;
 inline constexpr std::size_t kVisibilityCount = sh_count(kVisibilityOrder);
 using SkyVisibility = std::array<float, kVisibilityCount>;
 

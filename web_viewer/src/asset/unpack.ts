@@ -165,7 +165,7 @@ function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer
 function takeProgressive(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>) {
   const extension = json.extensions?.[kProgressive] as { version: number; bufferView: number } | undefined;
   if (!extension) return null;
-  if (extension.version !== 1) throw new Error(`/extensions/${kProgressive}/version: only version 1 is read`);
+  if (extension.version !== 2) throw new Error(`/extensions/${kProgressive}/version: only version 2 is read`);
   return bytesIn(takeExtension(json, kProgressive, extension).bufferView).slice();
 }
 
