@@ -7,9 +7,9 @@
 #include "core/artifact/evaluate.h"
 #include "core/artifact/eye.h"
 #include "core/bake/eye_material.h"
+#include "core/bake/field_eye.h"
 #include "core/base/expects.h"
 #include "core/base/random.h"
-#include "core/lightfield/seen.h"
 #include "core/mesh/topology.h"
 #include "core/trace/highlights.h"
 #include "core/trace/reference.h"
@@ -163,7 +163,7 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
                                         const LookupOptions& options) {
   std::vector<LightValue> out;
   const EyeLight seen = eye_light(baked, {light.begin(), light.end()}, true);
-  const std::optional<MirroredSky> sky = mirrored_sky(baked);
+  const FieldEye field(baked);
   for (const auto& place : places) {
     if (!place) {
       out.push_back(no_value());
@@ -178,10 +178,7 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
     const Vec3d normal = match_normal(baked.scene.mesh, *place);
     const SurfacePoint surface = surface_at(baked.scene, *place);
     if (!baked.field.coefficients.empty()) {
-      const EyeMaterial material = eye_material(baked.scene, surface);
-      out.back().radiance = seen_radiance(
-          baked.field, sky ? &*sky : nullptr,
-          {point.triangle, place->u, place->v, normal, normalized(*view), material.f0, material.roughness});
+      out.back().radiance = field.seen(*place, normal, normalized(*view));
       continue;
     }
     const EyeRadiance radiance =

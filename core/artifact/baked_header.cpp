@@ -136,7 +136,10 @@ void read_sky(const json& root, const Fields& extension, BakedHeader& out, Findi
     return findings.fail("slot_count_mismatch", "The table of lobes must have 16 rows of 32 views.",
                          lobes.pointer("rows"));
   sky.levels_view = levels.index("bufferView", 1u << 30);
-  sky.lobes_view = lobes.index("bufferView", 1u << 30);
+  const std::string mean = fields.pointer("mean");
+  const auto c = numbers(at(root, mean), mean, 3, findings);
+  if (findings.failed()) return;
+  sky.mean = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
   out.sky = std::move(sky);
 }
 

@@ -30,7 +30,8 @@ struct BakedHeader {
   struct Sky {          // that the field keeps apart
     StoredForm form;    // of its visibility
     PackedSky levels;   // without texels
-    int levels_view = -1, lobes_view = -1;
+    int levels_view = -1;
+    Vec3f mean;
   };
   std::optional<Sky> sky;
   GlossyTransfer glossy;  // its shape; of rank 0 (and order 0) where there are no matrices

@@ -27,9 +27,9 @@ struct BakedScene {
   Scene scene;            // final geometry and the original materials, textures and lights
   Transfer transfer;      // of scene.mesh's vertices
   GlossyTransfer glossy;  // of whole parts: all of a part's vertices have matrices, or none
+  LobeTable lobes;        // of glossy.order, where there are matrices
   LightField field;       // of scene.mesh's vertices, or of none
-  SkyLevels sky;          // of a field that keeps it apart
-  LobeTable lobes;        // of glossy.order where there are matrices, of order 1 where the field keeps a sky apart
+  SkyLevels sky;          // where the field keeps it apart
   BakedLight light;
   float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none

@@ -64,7 +64,7 @@ Result<CarriedScene> read_own(const SceneFiles& files, int degree, const ImportL
     return fault("not_a_baked_scene", "A light field stands beside a transfer of order 0.",
                  files.name + ": /extensions/KILN_radiance_transfer/order");
   baked.scene.images = std::move(images);
-  return CarriedScene{std::move(baked.scene), std::move(baked.field), std::move(baked.transfer)};
+  return CarriedScene{std::move(baked.scene), std::move(baked.field), std::move(baked.sky), std::move(baked.transfer)};
 }
 
 /// Radiance has all colours in it: nothing may multiply it, and no seam of textures hold the mesh.
@@ -89,7 +89,7 @@ Result<CarriedScene> import_carried_scene(const SceneFiles& files, const ImportL
   const int own = declared_degree(files, limits);
   if (own >= 0) return read_own(files, own, limits);
   KILN_TRY(lit, import_lit_scene(files, limits));
-  CarriedScene out{std::move(lit.scene), std::move(lit.field), {}};
+  CarriedScene out{std::move(lit.scene), std::move(lit.field), {}, {}};
   if (!out.carries_light()) return out;
   keep_shape_alone(out.scene);
   out.diffuse = diffuse_of(out.field, out.scene.mesh);

@@ -4,7 +4,7 @@
 
 #include "core/artifact/import.h"
 #include "core/base/result.h"
-#include "core/lightfield/light_field.h"
+#include "core/lightfield/mirrored_sky.h"
 #include "core/prt/transfer.h"
 #include "core/scene/scene.h"
 
@@ -13,6 +13,7 @@ namespace kiln {
 struct CarriedScene {
   Scene scene;
   LightField field;  // of scene.mesh's vertices; without coefficients where the file carries no light
+  SkyLevels sky;     // where the field keeps it apart
   Transfer diffuse;  // of order 0, beside a field: what viewers show that know one colour a vertex
 
   bool carries_light() const { return !field.coefficients.empty(); }

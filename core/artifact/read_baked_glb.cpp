@@ -296,7 +296,7 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.field = {.degree = std::max(0, field.series.order - 1),
                .coefficients = std::move(field.series.coefficients),
                .visibility = std::move(field.visibility.coefficients),
-               .sky = {}};
+               .sky = file.header.sky ? file.header.sky->mean : Vec3f{}};
   out.sky = file.sky;
   const auto finite = [](float c) { return std::isfinite(c); };
   if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite) ||
@@ -344,16 +344,9 @@ LobeTable read_glossy(const gltf::BufferBytes& bytes, BakedHeader& header, Findi
   return lobes;
 }
 
-/// The blurred skies of a light field, and the table of lobes that belongs to them.
-SkyLevels read_sky(const gltf::BufferBytes& bytes, BakedHeader& header, LobeTable& lobes, Findings& findings) {
+/// The blurred skies of a light field.
+SkyLevels read_sky(const gltf::BufferBytes& bytes, BakedHeader& header, Findings& findings) {
   if (!header.sky) return {};
-  if (header.glossy) {
-    findings.fail("not_a_baked_scene", "A light field with a sky has no matrices beside it.", kExtensionPlace);
-    return {};
-  }
-  const std::string place = "/extensions/KILN_light_field/sky/";
-  lobes = {1, std::vector<float>(LobeTable::size_of(1))};
-  read_floats(bytes, header.sky->lobes_view, place + "lobes/bufferView", lobes.numbers, findings);
   PackedSky& levels = header.sky->levels;
   std::size_t count = 0;
   for (const int height : levels.heights)
@@ -361,7 +354,7 @@ SkyLevels read_sky(const gltf::BufferBytes& bytes, BakedHeader& header, LobeTabl
   const auto view = static_cast<std::size_t>(header.sky->levels_view);
   if (header.sky->levels_view < 0 || view >= bytes.views.size() || bytes.views[view].size() != count * 4) {
     findings.fail("slot_count_mismatch", "The buffer view does not hold just these texels.",
-                  place + "levels/bufferView");
+                  "/extensions/KILN_light_field/sky/levels/bufferView");
     return {};
   }
   levels.texels.resize(count);
@@ -384,9 +377,9 @@ BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   if (findings.failed()) return {};
   read_components(bytes, header, findings);
   if (findings.failed()) return {};
-  LobeTable lobes = read_glossy(bytes, header, findings);
+  const LobeTable lobes = read_glossy(bytes, header, findings);
   if (findings.failed()) return {};
-  const SkyLevels sky = read_sky(bytes, header, lobes, findings);
+  const SkyLevels sky = read_sky(bytes, header, findings);
   if (findings.failed()) return {};
   return read_scene({document, bytes, header, lobes, sky}, findings);
 }

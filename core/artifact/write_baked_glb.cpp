@@ -44,8 +44,8 @@ void check_shape(const BakedScene& baked) {
   const LightField& field = baked.field;
   EXPECTS(field.coefficients.empty() ||
           (field.degree <= kMaxLightFieldDegree && field.vertices() == mesh.position.size()));
-  EXPECTS(!field.has_sky() || (field.visibility.size() == kVisibilityCount * mesh.position.size() &&
-                               baked.sky.size() >= 2 && baked.lobes.order == 1));
+  EXPECTS(!field.has_sky() ||
+          (field.visibility.size() == kVisibilityCount * mesh.position.size() && baked.sky.size() >= 2));
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -182,12 +182,13 @@ class Writer {
     if (!field_ || !field_->visibility()) return;
     sky_ = pack_sky(baked_.sky);
     sky_view_ = add_view({reinterpret_cast<const std::uint8_t*>(sky_.texels.data()), sky_.texels.size() * 4});
-    lobes_ = add_floats(baked_.lobes.numbers);
+    sky_lobes_ = add_floats(make_lobe_table(1).numbers);
   }
 
   json sky_extension() const {
     json out = {{"levels", {{"heights", sky_.heights}, {"unit", sky_.unit}, {"bufferView", *sky_view_}}},
-                {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *lobes_}}}};
+                {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *sky_lobes_}}},
+                {"mean", vec(baked_.field.sky)}};
     put_form(out, field_->visibility()->form(), {}, sky_name);
     return out;
   }
@@ -307,7 +308,8 @@ class Writer {
   std::optional<StoredTransfer> transfer_;
   std::optional<StoredGlossy> glossy_;
   std::optional<StoredField> field_;
-  std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_, sky_view_;  // buffer views
+  std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_, sky_view_,
+      sky_lobes_;  // buffer views
   PackedSky sky_;
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();

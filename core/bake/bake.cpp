@@ -181,7 +181,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   std::optional<OutgoingLight> outgoing;
   if (carried) {
     transport.transfer = in.diffuse;
-    outgoing.emplace(OutgoingLight{.field = in.field});
+    outgoing.emplace(OutgoingLight{.field = in.field, .sky = in.sky});
   } else if (plan.radiosity) {
     if (light) own.name = light->name;
     if (plan.links) {

@@ -2,9 +2,9 @@
 
 #include <chrono>
 
+#include "core/bake/field_eye.h"
 #include "core/bake/light_field_step.h"
 #include "core/base/random.h"
-#include "core/lightfield/seen.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
 #include "core/trace/surface_samples.h"
@@ -56,7 +56,8 @@ Plan make_carried_plan(const CarriedScene& in, const Recipe& recipe, bool sky) {
 FieldCertificate certify_carried(const CarriedCheck& check, Threads& threads) {
   const auto start = std::chrono::steady_clock::now();
   const Mesh& mesh = check.decoded.scene.mesh;
-  const ClosestPoint nearest(check.surface);
+  const ClosestPoint nearest(check.surface.mesh);
+  const FieldEye file(check.decoded), input(check.surface, check.field, check.sky);
   const std::uint64_t seed = mix64(check.seed ^ 0x63617272696564ULL);
   const std::vector<SurfaceSample> samples = sample_surface(mesh, kPoints, seed);
   std::vector<Vec3d> shown(samples.size()), truth(samples.size());
@@ -70,9 +71,9 @@ FieldCertificate certify_carried(const CarriedCheck& check, Threads& threads) {
       if (!match) continue;
       found[i] = 1;
       Random random(seed, i);
-      const Vec3d there = match_normal(check.surface, *match), view = random_view(there, random);
-      shown[i] = seen_radiance(check.decoded.field, mesh.triangles[s.triangle], s.u, s.v, normal, view);
-      truth[i] = seen_radiance(check.field, check.surface.triangles[match->triangle], match->u, match->v, there, view);
+      const Vec3d there = match_normal(check.surface.mesh, *match), view = random_view(there, random);
+      shown[i] = file.seen(here, normal, view);
+      truth[i] = input.seen(*match, there, view);
     }
   });
   std::size_t points = 0;

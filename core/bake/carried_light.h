@@ -20,8 +20,9 @@ Plan make_carried_plan(const CarriedScene&, const Recipe&, bool sky);
 
 struct CarriedCheck {
   const BakedScene& decoded;
-  const Mesh& surface;      // of the input,
+  const Scene& surface;     // of the input,
   const LightField& field;  // and what it carries
+  const SkyLevels& sky;     // where that keeps it apart
   std::uint64_t seed = 0;
 };
 

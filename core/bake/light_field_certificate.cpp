@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/bake/eye_material.h"
+#include "core/bake/field_eye.h"
 #include "core/base/random.h"
-#include "core/lightfield/seen.h"
 #include "core/mesh/closest_point.h"
 #include "core/mesh/topology.h"
 #include "core/prt/hidden.h"
@@ -36,8 +36,7 @@ Eyes open_eyes(const FieldCheck& check) {
   const HiddenTest hidden = hidden_test(check.truth);
   const ClosestPoint nearest(input.mesh);
   const LobeTable lobes = make_lobe_table(1);
-  const BakedScene& decoded = check.decoded;
-  const std::optional<MirroredSky> sky = mirrored_sky(decoded);
+  const FieldEye eye(check.decoded);
   const std::uint64_t seed = mix64(check.seed ^ 0x6669656c64ULL);
   Eyes out;
   std::uint64_t item = 0;
@@ -56,10 +55,7 @@ Eyes open_eyes(const FieldCheck& check) {
     if (hidden({place.position, place.normal, place.position, face})) continue;
     const EyeMaterial material = eye_material(input, at);
     const EyedPoint eyed{place, to_float(view), ggx_alpha(material.roughness), material.f0};
-    const EyeMaterial shown = eye_material(
-        decoded.scene, surface_point(decoded.scene, s.triangle, static_cast<float>(s.u), static_cast<float>(s.v)));
-    out.shown.push_back(seen_radiance(decoded.field, sky ? &*sky : nullptr,
-                                      {mesh.triangles[s.triangle], s.u, s.v, normal, view, shown.f0, shown.roughness}));
+    out.shown.push_back(eye.seen(here, normal, view));
     out.truth.push_back(eyed);
     out.below.push_back(place);
     out.reflected.push_back(material.diffuse * (1 - lobe_at(lobes, dot(there, view), material.roughness).kept()));

@@ -27,10 +27,7 @@ LightFieldStage::LightFieldStage(BakedScene& baked, OutgoingLight outgoing, Plan
   outcome_.carried = plan.field->carried;
   outcome_.baked_triangles = baked.scene.mesh.triangles.size();
   outcome_.baked_vertices = baked.scene.mesh.position.size();
-  if (outgoing.field.has_sky()) {
-    baked.sky = std::move(outgoing.sky);
-    baked.lobes = make_lobe_table(1);
-  }
+  baked.sky = std::move(outgoing.sky);
   log.begin("simplify", 0.9);
   levels_ = make_levels(surface_.mesh, baked.transfer, std::move(outgoing.field), *plan.field, log, threads);
   const FieldLevel& first = levels_.levels.front();
@@ -58,7 +55,7 @@ Result<FieldOutcome> LightFieldStage::finish(Bytes& glb, const BakedScene& decod
     level.bytes = bytes;
     if (!job.recipe.certificate) return;
     level.certificate = job.carried
-                            ? certify_carried({shown, job.surface.mesh, *job.carried, job.recipe.seed}, threads)
+                            ? certify_carried({shown, job.surface, *job.carried, shown.sky, job.recipe.seed}, threads)
                             : certify_field({shown, *truth, job.environment, log.rays(), job.recipe.seed}, threads);
   };
   if (!progressive_.empty()) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
 #include "core/artifact/stored_transfer.h"
 #include "core/bake/radiosity_step.h"
+#include "core/bake/sky_apart.h"
 #include "core/lightfield/polynomial_space.h"
 #include "core/trace/surface.h"
 
@@ -87,7 +87,6 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   f.outgoing.degree = step.degree.value_or(effort.degree);
   f.outgoing.rays = step.rays.value_or(effort.rays);
   f.outgoing.seed = recipe.seed;
-  f.outgoing.sky_apart = std::getenv("KILN_NOSKY") == nullptr && sky != nullptr && f.outgoing.degree >= 2;
   const std::string asked = "asked for by the recipe";
   if (!step.surface.subdivide.triangles) {
     for (Decision& d : plan.decisions) {
@@ -101,6 +100,9 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
   decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
          (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
+  const SkyDecision part = decide_sky(scene, sky, f.outgoing.degree, effort.storage, step.sky);
+  f.outgoing.sky_apart = part.apart;
+  decide(plan, "sky", part.apart ? "apart" : "in the series", part.reason);
   decide_simplification(plan, recipe);
   add_field_prediction(plan);
   return plan;

@@ -9,7 +9,7 @@
 #include "core/artifact/look.h"
 #include "core/artifact/png.h"
 #include "core/bake/eye_material.h"
-#include "core/lightfield/seen.h"
+#include "core/bake/field_eye.h"
 #include "core/scene/texture.h"
 #include "core/trace/reference.h"
 #include "core/trace/surface.h"
@@ -78,7 +78,7 @@ struct Painter {
   const Tracer& tracer;
   std::vector<Vec3f> value;
   EyeLight light;
-  std::optional<MirroredSky> sky;
+  FieldEye field;
 
   Vec3f color(const Vec3f& eye, const Vec3f& direction, float height) const {
     const Hit hit = first_facing(tracer, eye, direction);
@@ -86,7 +86,7 @@ struct Painter {
     const Scene& scene = tracer.scene();
     const SurfacePoint place = surface_point(scene, hit.triangle, hit.u, hit.v);
     const Triangle& t = scene.mesh.triangles[hit.triangle];
-    if (!baked.field.coefficients.empty()) return tone_map(of_field(hit, place, t, direction) * baked.exposure);
+    if (!baked.field.coefficients.empty()) return tone_map(of_field(hit, place, direction) * baked.exposure);
     if (baked.glossy && has_matrices(baked.glossy, t)) return shown(specular(hit, place, t, direction), place);
     const Vec3f at = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
     return shown(at * albedo_at(scene, place), place);
@@ -96,11 +96,10 @@ struct Painter {
     return tone_map((reflected + emission_at(tracer.scene(), place)) * baked.exposure);
   }
 
-  Vec3f of_field(const Hit& hit, const SurfacePoint& place, const Triangle& t, const Vec3f& direction) const {
+  Vec3f of_field(const Hit& hit, const SurfacePoint& place, const Vec3f& direction) const {
     const Vec3d normal = normalized(to_double(place.normal)), view = normalized(to_double(-direction));
-    const EyeMaterial material = eye_material(tracer.scene(), place);
-    return to_float(seen_radiance(baked.field, sky ? &*sky : nullptr,
-                                  {t, hit.u, hit.v, normal, view, material.f0, material.roughness}));
+    const SurfaceMatch match{hit.triangle, double{hit.u}, double{hit.v}, 0};
+    return to_float(field.seen(match, normal, view));
   }
 
   /// All that a part with matrices reflects to the camera.
@@ -234,7 +233,8 @@ Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, co
                              Threads& threads) {
   const Rays rays{frame_camera(decoded.scene.mesh, preview), preview};
   const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients),
-                        eye_light(decoded, decoded.light.coefficients, true), mirrored_sky(decoded)};
+                        eye_light(decoded, decoded.light.coefficients, true),
+                        FieldEye(tracer.scene(), decoded.field, decoded.sky)};
   const auto color = [&](std::size_t, const Rays::Ray& ray) {
     return painter.color(rays.camera.eye, ray.direction, ray.height);
   };

@@ -84,10 +84,14 @@ struct TransportStep {
   std::optional<int> sender_level;  // the finest level of points that send; auto when absent
 };
 
+/// How a light field holds the sky (sky_apart.h).
+enum class SkyPart { automatic, apart, series };
+
 /// Radiance towards every eye at the vertices (core/lightfield/outgoing.h), under the light of one job.
 struct LightFieldStep {
   RadiosityStep surface;  // bounces and subdivision; the rest is automatic
   RadianceBasis basis = RadianceBasis::harmonics;
+  SkyPart sky = SkyPart::automatic;
   std::optional<int> degree;  // bands 0 .. degree
   std::optional<int> rays;    // of a vertex
   struct Simplification {     // auto when none of the three is given

@@ -93,6 +93,7 @@ json simplification_json(const LightFieldStep::Simplification& s) {
 json step_json(const LightFieldStep& step) {
   return {{"do", "lightfield"},
           {"basis", step.basis == RadianceBasis::harmonics ? "sh" : "polynomial"},
+          {"sky", std::array{"auto", "apart", "series"}[static_cast<std::size_t>(step.sky)]},
           {"degree", or_auto(step.degree)},
           {"rays", or_auto(step.rays)},
           {"bounces", or_auto(step.surface.bounces)},

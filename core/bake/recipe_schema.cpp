@@ -99,6 +99,7 @@ std::string recipe_schema() {
       "properties": {
         "do": {"enum": ["lightfield"]},
         "basis": {"description": "what is fitted: spherical harmonics, (degree + 1)^2 coefficients, or polynomials of the direction along the surface, (degree + 1)(degree + 2) / 2; files hold harmonics in world axes in either case", "enum": ["sh", "polynomial"], "default": "sh"},
+        "sky": {"description": "apart: smooth surfaces mirror the sky as it is, as much of it as each vertex sees; series: everything is in the series; auto: apart where something mirrors the sky more sharply than the series can say", "enum": ["auto", "apart", "series"], "default": "auto"},
         "degree": {"description": "bands 0 .. degree of radiance towards the eye; not used where the file carries its light", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 8}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "rays": {"description": "of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "bounces": {"$ref": "#/definitions/gather_bounces"},

@@ -150,7 +150,7 @@ SkyLevels blur_sky(const Environment& sky, double least, Threads& threads) {
   return out;
 }
 
-MirroredSky::MirroredSky(const SkyLevels& levels, const LobeTable& lobes) : levels_(levels), lobes_(lobes) {
+MirroredSky::MirroredSky(const SkyLevels& levels) : levels_(levels), lobes_(make_lobe_table(1)) {
   EXPECTS(levels.size() >= 2);
 }
 

@@ -30,8 +30,8 @@ SkyLevels blur_sky(const Environment&, double least, Threads&);
 
 class MirroredSky {
  public:
-  /// Expects at least two levels. `lobes` has order 1 or more. Keeps references.
-  MirroredSky(const SkyLevels&, const LobeTable& lobes);
+  /// Expects at least two levels, and keeps a reference to them.
+  explicit MirroredSky(const SkyLevels&);
 
   struct Surface {
     Vec3d normal, f0;
@@ -44,7 +44,7 @@ class MirroredSky {
   Vec3d blurred(const Vec3d& w, double alpha) const;
 
   const SkyLevels& levels_;
-  const LobeTable& lobes_;
+  LobeTable lobes_;
 };
 
 }  // namespace kiln

@@ -255,8 +255,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   Header h;
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
-    if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
-  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 31 ||
+  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 63 ||
       h.rank > h.stride())
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)

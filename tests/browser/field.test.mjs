@@ -1,7 +1,8 @@
 // Light fields: the reader against kiln, the picture against the reader.
 //
 // fixtures/field.glb is a ball of metal over a floor, degree 4; lod1.glb and lod2.glb are the same with fewer vertices.
-// field.csv is what kiln eval says that eyes see of it (fixtures/make_field.sh).
+// field.csv is what kiln eval says that eyes see of it; sky.glb and sky.csv are alike, and keep the sky apart
+// (fixtures/make_field.sh).
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -15,9 +16,10 @@ const { evaluateSh } = await load('light/sh.ts');
 const { harmonicsCode } = await load('shaders/harmonics_code.ts');
 const { unpack, readPacked } = await load('asset/unpack.ts');
 const reader = await load('asset/light_field.ts');
+const { MirroredSky, colourOf } = await load('asset/mirrored_sky.ts');
 const { fieldCount, halfAt, halfOf, numberOfHalf, readLightField, seenRadiance, texelsOf } = reader;
 const fixture = (name) => readFileSync(new URL(`fixtures/${name}`, import.meta.url));
-const file = fixture('field.glb');
+const [file, skyFile] = [fixture('field.glb'), fixture('sky.glb')];
 const draco = await fromViewer('draco3dgltf').createDecoderModule({});
 const bytesOf = (buffer) => buffer.buffer.slice(buffer.byteOffset, buffer.byteOffset + buffer.byteLength);
 const kHalfStep = 2 ** -11; // rounding to half floats, relative
@@ -65,14 +67,14 @@ test('every coefficient has a half of its own, and no texel is left over', () =>
     for (let c = 0; c < 3; ++c) for (let i = 0; i < fieldCount(degree); ++i) places.add(halfAt(degree, i, c));
     assert.equal(places.size, 3 * fieldCount(degree));
     assert.equal(Math.max(...places), places.size - 1);
-    assert.equal(texelsOf(degree), Math.ceil(places.size / 8));
+    assert.equal(texelsOf({ degree, sky: false }), Math.ceil(places.size / 8));
   }
 });
 
 /// The largest error that rounding of coefficients can bring to (8).
 function rounding(field, corners, weights, normal, view) {
   const y = harmonics(field.degree, reader.reflectedView(normal, view));
-  const width = 8 * texelsOf(field.degree);
+  const width = 8 * texelsOf(field);
   const number = (v, i, c) => numberOfHalf(field.halves[width * v + halfAt(field.degree, i, c)]);
   return [0, 1, 2].map((c) => {
     let sum = 0;
@@ -104,28 +106,49 @@ function triangleAt(parts, place) {
   throw new Error(`no triangle at ${place}`);
 }
 
-test('what an eye sees between three vertices is what kiln says', () => {
-  const { baked } = unpack(draco, readPacked(bytesOf(file)));
-  const [names, ...lines] = fixture('field.csv').toString().trim().split('\n');
-  assert.match(names, /^x,y,z,nx,ny,nz,vx,vy,vz,.*,radiance_r,radiance_g,radiance_b,distance$/);
-  const rows = lines.map((line) => line.split(',').map(Number));
-  const { json } = glbJson(file);
-  const { scale, translation } = json.nodes[json.scenes[0].nodes[0]];
-  let below = 0;
-  for (const row of rows) {
-    const [place, view, expected] = [row.slice(0, 3), row.slice(6, 9), row.slice(12, 15)];
-    const inCube = place.map((x, a) => (x - translation[a]) / scale[a]);
-    const { part, corners, weights } = triangleAt(baked, inCube);
-    const normal = unit(mean(part.normals, corners, weights));
-    if (dot(normal, view) < 0) ++below;
-    const bound = rounding(part.field, corners, weights, normal, view);
-    seenRadiance(part.field, corners, weights, normal, view).forEach((x, c) => {
-      // and kiln looks the place up in floats: 2^-24 of the cube beside it, 1e-5 of a triangle
-      const most = bound[c] + 1e-5 * (1 + x);
-      assert.ok(Math.abs(x - expected[c]) <= most, `${x} is not ${expected[c]} within ${most}`);
-    });
-  }
-  assert.ok(rows.length >= 80 && below >= 20, 'too few rows, or no eye below a horizon');
+/// Base colour and finish of a part of the fixtures, which have no textures.
+function mirrorOf(json, part, sky) {
+  if (!sky) return undefined;
+  const { baseColorFactor, metallicFactor, roughnessFactor } = json.materials[part].pbrMetallicRoughness;
+  const f0 = baseColorFactor.slice(0, 3).map((c) => 0.04 * (1 - metallicFactor) + c * metallicFactor);
+  return { sky: new MirroredSky(sky), f0, roughness: roughnessFactor };
+}
+
+for (const name of ['field', 'sky'])
+  test(`what an eye sees between three vertices is what kiln says: ${name}`, () => {
+    const { baked, sky } = unpack(draco, readPacked(bytesOf(fixture(`${name}.glb`))));
+    assert.equal(sky !== null, name === 'sky');
+    const [names, ...lines] = fixture(`${name}.csv`).toString().trim().split('\n');
+    assert.match(names, /^x,y,z,nx,ny,nz,vx,vy,vz,.*,radiance_r,radiance_g,radiance_b,distance$/);
+    const rows = lines.map((line) => line.split(',').map(Number));
+    const { json } = glbJson(fixture(`${name}.glb`));
+    const mirrors = baked.map((_, i) => mirrorOf(json, json.meshes[1].primitives[i].material, sky));
+    const { scale, translation } = json.nodes[json.scenes[0].nodes[0]];
+    let [below, mirrored] = [0, 0];
+    for (const row of rows) {
+      const [place, view, expected] = [row.slice(0, 3), row.slice(6, 9), row.slice(12, 15)];
+      const inCube = place.map((x, a) => (x - translation[a]) / scale[a]);
+      const { part, corners, weights } = triangleAt(baked, inCube);
+      const mirror = mirrors[baked.indexOf(part)];
+      const normal = unit(mean(part.normals, corners, weights));
+      if (dot(normal, view) < 0) ++below;
+      const bound = rounding(part.field, corners, weights, normal, view);
+      const alone = seenRadiance(part.field, corners, weights, normal, view);
+      seenRadiance(part.field, corners, weights, normal, view, mirror).forEach((x, c) => {
+        // and kiln looks the place up in floats: 2^-24 of the cube beside it, 1e-5 of a triangle; visibility is in halves
+        const most = bound[c] + 1e-5 * (1 + x) + (mirror ? 8 * kHalfStep * x : 0);
+        assert.ok(Math.abs(x - expected[c]) <= most, `${x} is not ${expected[c]} within ${most}`);
+        if (x > 1.5 * alone[c]) ++mirrored;
+      });
+    }
+    assert.ok(rows.length >= 80 && below >= 20, 'too few rows, or no eye below a horizon');
+    assert.equal(mirrored > 20, name === 'sky', 'the sky is not in what is seen');
+  });
+
+test('shared exponents are what they stand for', () => {
+  assert.deepEqual(colourOf(0), [0, 0, 0]);
+  assert.deepEqual(colourOf(((16 << 27) | (64 << 18) | (128 << 9) | 256) >>> 0), [1, 0.5, 0.25]);
+  assert.deepEqual(colourOf(0xffffffff).map((x) => x), [65408, 65408, 65408]);
 });
 
 test('the numbers of a field leave the plain file', () => {
@@ -156,7 +179,7 @@ test('of components mean and weighted rows are added', () => {
         const term = (e.offset[k] + e.scale[k] * stored[k >> 2][4 * v + (k & 3)]) * rows[(k + 1) * slots + s];
         [sum, size] = [sum + term, size + Math.abs(term)];
       }
-      const found = unit * numberOfHalf(halves[8 * texelsOf(degree) * v + halfAt(degree, s % 9, Math.floor(s / 9))]);
+      const found = unit * numberOfHalf(halves[8 * texelsOf({ degree, sky: false }) * v + halfAt(degree, s % 9, Math.floor(s / 9))]);
       assert.ok(Math.abs(found - sum) <= kHalfStep * Math.abs(sum) + 1e-6 * size, `${found} is not ${sum}`);
     }
 });
@@ -172,6 +195,31 @@ const kFaults = {
   scale: (e) => e.scale.pop(),
   offset: (e) => (e.offset[7] = 'much'),
 };
+
+const skyExtension = () => structuredClone(glbJson(skyFile).json.extensions.KILN_light_field);
+const kSkyFaults = {
+  form: (sky) => (sky.form = 'components'),
+  attributes: (sky) => sky.attributes.pop(),
+  scale: (sky) => sky.scale.pop(),
+  offset: (sky) => (sky.offset[2] = null),
+  'levels/heights': (sky) => (sky.levels.heights = [64]),
+  'levels/unit': (sky) => (sky.levels.unit = 0),
+  lobes: (sky) => (sky.lobes.rows = 17),
+};
+
+for (const [member, spoil] of Object.entries(kSkyFaults))
+  test(`a wrong ${member} of the sky is refused by its JSON pointer`, () => {
+    const e = skyExtension();
+    spoil(e.sky);
+    const place = new RegExp(`^Error: /extensions/KILN_light_field/sky/${member}: `);
+    assert.throws(() => readLightField({ extensions: { KILN_light_field: e } }), place);
+  });
+
+test('a sky of the wrong size is refused', () => {
+  const packed = readPacked(bytesOf(skyFile));
+  packed.json.extensions.KILN_light_field.sky.levels.heights[0] = 64;
+  assert.throws(() => unpack(draco, packed), /the sky of the light field needs/);
+});
 
 for (const [member, spoil] of Object.entries(kFaults))
   test(`a wrong ${member} is refused by its JSON pointer`, () => {
@@ -202,20 +250,23 @@ const kReport = {
   },
 };
 
-let browser, mock;
+let browser, mock, skyMock;
 before(async () => {
   browser = await startBrowser();
   mock = await startMock({ files: { 'scene.glb': file, 'report.json': Buffer.from(JSON.stringify(kReport)) } });
+  skyMock = await startMock({ files: { 'scene.glb': skyFile } });
   const { artifacts } = mock.jobs.get(jobId('done'));
   for (const name of ['lod2.glb', 'lod1.glb']) artifacts.push({ ...artifacts[0], name, bytes: fixture(name).length });
 });
 after(async () => {
   await browser.close();
   await mock.close();
+  await skyMock.close();
 });
 
 const address = (hash) => `${mock.url}/view/${jobId('done')}#${hash}`;
 const withField = (hash, act) => withReady(browser, address(hash), act);
+const withSky = (hash, act) => withReady(browser, `${skyMock.url}/view/${jobId('done')}#${hash}`, act);
 
 /// Pixels well inside triangles of the ball that face the eye: their colour, and what the reader says is seen there, at
 /// the pixel and at the corners of its triangle.
@@ -272,14 +323,16 @@ const kSteps = 1.6 / 255; // rounding to bytes, and dithering by up to one of th
 const near = (shown, expected, tolerance) =>
   shown.forEach((x, c) => assert.ok(Math.abs(x - expected[c]) < tolerance, `${shown} is not ${expected}`));
 
+const kPoses = [
+  [0.9, 0.84, 1.8, 0, 0.3, 0],
+  [-1.8, 0.3, -0.4, 0, 0.3, 0],
+  [0.3, -0.4, 1.9, 0, 0.3, 0],
+];
+
 test('a pixel is what the reader sees there, from wherever one looks, and highlights move', () =>
   withField('tone=none&ev=-2&background=off', async (page) => {
     const brightest = [];
-    for (const pose of [
-      [0.9, 0.84, 1.8, 0, 0.3, 0],
-      [-1.8, 0.3, -0.4, 0, 0.3, 0],
-      [0.3, -0.4, 1.9, 0, 0.3, 0],
-    ]) {
+    for (const pose of kPoses) {
       const { seen, exposure } = await look(page, pose);
       assert.ok(seen.length > 20);
       for (const { colour, expected } of seen) near(colour, display(expected, exposure), kSteps);
@@ -287,6 +340,21 @@ test('a pixel is what the reader sees there, from wherever one looks, and highli
       brightest.push(seen.reduce((a, b) => (size(a) > size(b) ? a : b)).face);
     }
     assert.notEqual(brightest[0], brightest[1], 'the highlight stays where it was');
+  }));
+
+// Levels of the sky are brought to one resolution on the graphics card, in half floats.
+const kSkySteps = 3 / 255;
+
+test('so is one that mirrors the sky, at pixels and at vertices, and with every level in one file', () =>
+  withSky('tone=none&ev=-2&background=off', async (page) => {
+    for (const pose of kPoses) {
+      const { seen, exposure } = await look(page, pose);
+      assert.ok(seen.length > 20);
+      for (const { colour, expected } of seen) near(colour, display(expected, exposure), kSkySteps);
+    }
+    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'vertices' }));
+    const { seen, exposure } = await look(page, kPoses[0]);
+    for (const one of seen) near(one.colour, display(between(one), exposure), kSkySteps);
   }));
 
 const between = ({ corners, weights }) =>

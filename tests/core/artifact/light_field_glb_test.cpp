@@ -7,6 +7,7 @@
 
 #include "core/artifact/glb.h"
 #include "core/artifact/progressive_glb.h"
+#include "core/artifact/sky_levels.h"
 #include "core/base/random.h"
 #include "core/lightfield/progressive_mesh.h"
 #include "tests/core/artifact/random_baked.h"
@@ -71,6 +72,77 @@ TEST(LightFieldGlb, WhatIsNotRightIsRefusedByName) {
   EXPECT_EQ(code("\"reflected\":true", "\"reflected\":false"), "not_a_baked_scene");
   EXPECT_EQ(code("\"_SLF_0\",\"_SLF_1\"", "\"_SLF_1\",\"_SLF_0\""), "slot_count_mismatch");
   EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":2"), "unsupported_version");
+}
+
+SkyLevels random_sky(float brightest) {
+  SkyLevels out;
+  Random random(11, 0);
+  for (const int height : {4, 8, 16}) {
+    Environment level{.name = {}, .width = 2 * height, .height = height, .radiance = {}};
+    for (int i = 0; i < 2 * height * height; ++i) {
+      const float bright = std::exp2(-20 * random.uniform()) * brightest;
+      level.radiance.push_back({bright * random.uniform(), bright, bright * random.uniform()});
+    }
+    level.radiance[3] = {0, 0, 0};
+    out.push_back(level);
+  }
+  return out;
+}
+
+BakedScene with_sky() {
+  BakedScene out = with_field(2);
+  Random random(9, 0);
+  for (std::size_t i = 0; i < kVisibilityCount * out.scene.mesh.position.size(); ++i)
+    out.field.visibility.push_back(4 * random.uniform() - 1);
+  out.field.sky = {0.5F, 1, 2};
+  out.sky = random_sky(100);
+  return out;
+}
+
+TEST(LightFieldGlb, ASkyThatIsKeptApartTravelsWithTheField) {
+  const BakedScene written = with_sky(), read = round_trip(written);
+  ASSERT_TRUE(read.field.has_sky());
+  EXPECT_EQ(read.field.sky, written.field.sky);
+  const auto original = original_vertices(read);
+  double worst = 0;
+  for (std::size_t v = 0; v < read.field.vertices(); ++v) {
+    for (std::size_t i = 0; i < kVisibilityCount; ++i)
+      worst = std::max<double>(worst, std::abs(read.field.visibility[kVisibilityCount * v + i] -
+                                               written.field.visibility[kVisibilityCount * original[v] + i]));
+  }
+  EXPECT_LE(worst, 1.001 * 2 / 1023);  // ten bits over a range of at most 4: half a step
+  ASSERT_EQ(read.sky.size(), written.sky.size());
+  EXPECT_EQ(read.sky[2].height, 16);
+}
+
+TEST(LightFieldGlb, SharedExponentsKeepABrightTexelToHalfAStep) {
+  for (const float brightest : {1e-6F, 1.0F, 3e9F}) {
+    const SkyLevels sky = random_sky(brightest), back = unpack_sky(pack_sky(sky));
+    for (std::size_t k = 0; k < sky.size(); ++k) {
+      for (std::size_t i = 0; i < sky[k].radiance.size(); ++i) {
+        const Vec3f off = back[k].radiance[i] - sky[k].radiance[i];
+        const float most = std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)});
+        // Half of 1/256 of a power of two at most the brightest channel; below 2^-24 of the largest there are no steps.
+        EXPECT_LE(most, sky[k].radiance[i].y / 512 + brightest * std::exp2(-39.0F)) << brightest;
+      }
+    }
+    EXPECT_EQ(back[0].radiance[3], (Vec3f{0, 0, 0}));
+  }
+}
+
+TEST(LightFieldGlb, ASkyThatIsNotRightIsRefusedByName) {
+  const Bytes file = *write_baked_glb(with_sky());
+  const auto code = [&](const std::string& from, const std::string& to) -> std::string {
+    const auto read = read_baked_glb(with_json(file, from, to));
+    return read ? "read" : read.error().code;
+  };
+  EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,8,32]"), "slot_count_mismatch");
+  EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[16]"), "number_out_of_range");
+  EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,8,99999]"), "number_out_of_range");
+  EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,-8,16]"), "number_out_of_range");
+  EXPECT_EQ(code("\"_SLF_SKY_0\",\"_SLF_SKY_1\"", "\"_SLF_SKY_1\",\"_SLF_SKY_0\""), "slot_count_mismatch");
+  EXPECT_EQ(code("\"rows\":16", "\"rows\":15"), "slot_count_mismatch");
+  EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[0.5,1.0]"), "slot_count_mismatch");
 }
 
 TEST(LightFieldGlb, AProgressiveMeshTravelsWithTheScene) {

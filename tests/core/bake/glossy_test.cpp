@@ -24,21 +24,9 @@ namespace {
 
 using nlohmann::json;
 using testing::file;
+using testing::finished;
 using testing::input_of;
 using testing::report_of;
-
-/// A bundled scene with other finishes: {"knot": {"metallicFactor": 1, "roughnessFactor": 0.5}}.
-BakeInput finished(const std::string& scene, const std::string& recipe, const json& finishes) {
-  BakeInput input = input_of(scene, recipe);
-  const auto chunks = split_glb(input.scene.main);
-  json document = json::parse(chunks->json);
-  for (json& material : document["materials"]) {
-    const std::string name = material["name"];
-    if (finishes.contains(name)) material["pbrMetallicRoughness"].update(finishes[name]);
-  }
-  input.scene.main = *join_glb(document.dump(), Bytes(chunks->binary.begin(), chunks->binary.end()));
-  return input;
-}
 
 std::string small(const std::string& more = "") {
   return R"({"environment":{"builtin":"overcast"},"quality":"draft","steps":[{"do":"prt","samples":256,"bounces":2,"subdivide":{"triangles":4000})" +

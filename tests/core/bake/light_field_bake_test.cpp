@@ -7,9 +7,10 @@
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/progressive_glb.h"
+#include "core/bake/field_eye.h"
 #include "core/bake/light_field_levels.h"
+#include "core/bake/sky_apart.h"
 #include "core/lightfield/polynomial_space.h"
-#include "core/lightfield/seen.h"
 #include "tests/core/bake/bake_input.h"
 
 namespace kiln {
@@ -62,10 +63,11 @@ TEST(LightFieldBake, WhatLooksTheSameFromEverywhereIsThatOfRadiosity) {
   const auto shown = read_baked_glb(file(field, "scene.glb"));
   ASSERT_TRUE(shown);
   double field_sum = 0, light_sum = 0;
-  for (std::size_t i = 0; i < shown->scene.mesh.triangles.size(); ++i) {
+  const FieldEye eye(*shown);
+  for (std::uint32_t i = 0; i < shown->scene.mesh.triangles.size(); ++i) {
     const Triangle& t = shown->scene.mesh.triangles[i];
     const Vec3d n = to_double(shown->scene.mesh.normal[t[0]]);
-    field_sum += seen_radiance(shown->field, t, 0, 0, n, n).y;
+    field_sum += eye.seen({i, 0, 0, 0}, n, n).y;
     const Part& part = shown->scene.parts[shown->scene.mesh.part[i]];
     const double albedo = shown->scene.materials[static_cast<std::size_t>(part.material)].base_color.y;
     light_sum += albedo * double{shown->transfer.at(t[0], 0)[1]};
@@ -154,6 +156,71 @@ TEST(LightFieldBake, DarknessIsDarkAndHasNoError) {
   const nlohmann::json field = report_of(out)["lightfield"];
   EXPECT_EQ(field["certificate"]["relrmse"], 0.0);
   EXPECT_EQ(field["noise"], 0.0);
+}
+
+Scene metal_face(float roughness) {
+  Scene scene;
+  scene.mesh.position = {{0, 0, 0}, {0.1F, 0, 0}, {0, 0.1F, 0}};
+  scene.mesh.normal.assign(3, {0, 0, 1});
+  scene.mesh.triangles = {{0, 1, 2}};
+  scene.mesh.part = {0};
+  scene.parts = {{.name = "face"}};
+  scene.materials = {{.name = "metal", .metallic = 1, .roughness = roughness}};
+  return scene;
+}
+
+/// What the plan says of the sky.
+nlohmann::json decision_of(const BakeOutput& out) {
+  for (const auto& decision : report_of(out)["plan"]["decisions"])
+    if (decision["decision"] == "sky") return decision;
+  return {};
+}
+
+TEST(LightFieldSky, IsApartOnlyWhereSomethingMirrorsItTooSharply) {
+  const Scene rough = metal_face(0.9F), smooth = metal_face(0.2F);
+  const Environment sun = clear_sky_with_sun(), even = constant_sky({1, 1, 1});
+  const auto choose = [](const Scene& scene, const Environment* sky, SkyPart asked = SkyPart::automatic) {
+    return decide_sky(scene, sky, 4, 0.02, asked);
+  };
+  EXPECT_TRUE(choose(smooth, &sun).apart) << choose(smooth, &sun).reason;
+  EXPECT_FALSE(choose(smooth, &even).apart);
+  EXPECT_FALSE(choose(smooth, nullptr).apart);
+  EXPECT_FALSE(choose(rough, &sun).apart);
+  EXPECT_TRUE(choose(smooth, &even, SkyPart::apart).apart);
+  EXPECT_FALSE(choose(rough, &sun, SkyPart::apart).apart);  // nothing would be kept
+  EXPECT_FALSE(choose(smooth, &sun, SkyPart::series).apart);
+  EXPECT_FALSE(decide_sky(smooth, &sun, 1, 0.02, SkyPart::automatic).apart);
+  EXPECT_NE(choose(rough, &sun).reason.find("roughness 0.9"), std::string::npos) << choose(rough, &sun).reason;
+}
+
+/// Bands 0 and 1 hold a sky that is a constant and a slope; a small lamp they do not.
+TEST(LightFieldSky, WhatBandsLeaveOut) {
+  const auto sky = [](auto&& radiance) { return averaged_sky(64, 2, radiance); };
+  EXPECT_LT(left_by_bands(sky([](const Vec3f& w) { return Vec3f{1, 1, 1} * (1 + 0.5F * w.y); }), 1), 0.002);
+  const Environment lamp = sky([](const Vec3f& w) { return Vec3f{1, 1, 1} * (w.y > 0.95F ? 100.0F : 0.1F); });
+  EXPECT_GT(left_by_bands(lamp, 4), 1);
+  EXPECT_GT(left_by_bands(lamp, 2), left_by_bands(lamp, 8));
+}
+
+/// The skip against the whole: where the plan leaves the sky in the series, keeping it apart would change nothing.
+TEST(LightFieldSky, UnderAnEvenSkyBothSayTheSame) {
+  const auto bake_with = [](const std::string& sky) {
+    Threads threads(2);
+    const std::string recipe = R"({"steps":[{"do":"lightfield","degree":4,"rays":512,"subdivide":"off","simplify":"off",
+      "sky":")" + sky + R"("}],"quality":"draft","environment":{"builtin":"uniform"}})";
+    auto output =
+        bake(testing::finished("column", recipe, {{"knot", {{"metallicFactor", 1}, {"roughnessFactor", 0.3}}}}), {},
+             threads);
+    EXPECT_TRUE(output) << output.error().message;
+    return std::move(*output);
+  };
+  const BakeOutput skipped = bake_with("auto"), forced = bake_with("apart");
+  EXPECT_EQ(decision_of(skipped)["choice"], "in the series");
+  EXPECT_EQ(decision_of(forced)["choice"], "apart");
+  const double a = report_of(skipped)["lightfield"]["levels"][0]["certificate"]["relrmse"];
+  const double b = report_of(forced)["lightfield"]["levels"][0]["certificate"]["relrmse"];
+  std::printf("in the series %.4f, apart %.4f\n", a, b);
+  EXPECT_NEAR(a, b, 0.02);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "core/lightfield/seen.h"
 #include "core/meshless/radiosity.h"
@@ -17,7 +18,7 @@ namespace kiln {
 namespace {
 
 /// A metal ball beside a diffuse wall.
-Scene ball_and_wall() {
+Scene ball_and_wall(float roughness) {
   Scene scene = testing::empty_scene();
   const std::uint32_t metal = testing::add_part(scene, {0.9F, 0.6F, 0.3F});
   testing::add_sphere(scene, {0, 0, 0}, 0.2F, 24, metal);
@@ -25,7 +26,7 @@ Scene ball_and_wall() {
   testing::add_grid(scene, {-0.4F, -0.4F, 0.4F}, {0, 0.8F, 0}, {0.8F, 0, 0}, 8, 8, wall);
   for (Material& m : scene.materials) m.metallic = 0, m.roughness = 1;
   Material& m = scene.materials[static_cast<std::size_t>(scene.parts[metal].material)];
-  m.metallic = 1, m.roughness = 0.5F;
+  m.metallic = 1, m.roughness = roughness;
   return scene;
 }
 
@@ -43,14 +44,11 @@ Made make(const Tracer& tracer, const Environment& sky, OutgoingBake params, Thr
   return out;
 }
 
-TEST(Outgoing, AMetalBallBesideAWallLooksAsPathsSeeIt) {
-  Threads threads(2);
-  const Scene scene = ball_and_wall();
-  const Tracer tracer(scene, threads);
-  const Environment sky = overcast_sky();
-  const Made made = make(tracer, sky, {.degree = 8, .rays = 2048}, threads);
-  const Mesh& mesh = scene.mesh;
-  // Vertices of the ball, seen from random directions.
+/// relRMSE of vertices of the ball, seen from random directions.
+double error_of(const Tracer& tracer, const Environment& sky, const OutgoingLight& light, double roughness,
+                Threads& threads) {
+  const Mesh& mesh = tracer.scene().mesh;
+  const Vec3d f0{0.9, 0.6, 0.3};
   std::vector<EyedPoint> eyes;
   std::vector<std::uint32_t> vertices;
   for (std::uint32_t v = 30; v < 500; v += 7) {
@@ -59,16 +57,19 @@ TEST(Outgoing, AMetalBallBesideAWallLooksAsPathsSeeIt) {
     vertices.push_back(v);
     eyes.push_back({{mesh.position[v], mesh.normal[v], mesh.normal[v]},
                     to_float(random_view(n, random)),
-                    ggx_alpha(0.5),
-                    {0.9, 0.6, 0.3}});
+                    ggx_alpha(roughness),
+                    f0});
   }
   const ReferenceResult truth =
       trace_specular(tracer, eyes, {.environments = {sky}}, {.samples = 2048, .seed = 5}, threads);
+  std::optional<MirroredSky> mirrored;
+  if (light.field.has_sky()) mirrored.emplace(light.sky);
   double squares = 0, mean = 0, noise = 0;
   for (std::size_t i = 0; i < eyes.size(); ++i) {
     const std::uint32_t v = vertices[i];
-    const Vec3d shown =
-        seen_radiance(made.light.field, {v, v, v}, 0, 0, to_double(mesh.normal[v]), to_double(eyes[i].view));
+    const Triangle t{v, v, v};
+    const Vec3d shown = seen_radiance(light.field, mirrored ? &*mirrored : nullptr,
+                                      {t, 0, 0, to_double(mesh.normal[v]), to_double(eyes[i].view), f0, roughness});
     for (std::size_t c = 0; c < 3; ++c) {
       squares += std::pow(shown[c] - truth.value[i][c], 2);
       noise += std::pow((truth.half_a[i][c] - truth.half_b[i][c]) / 2, 2);
@@ -76,15 +77,83 @@ TEST(Outgoing, AMetalBallBesideAWallLooksAsPathsSeeIt) {
     }
   }
   const double n = 3 * static_cast<double>(eyes.size());
-  const double error = std::sqrt(std::max(0.0, squares - noise) / n) / (mean / n);
+  return std::sqrt(std::max(0.0, squares - noise) / n) / (mean / n);
+}
+
+TEST(Outgoing, AMetalBallBesideAWallLooksAsPathsSeeIt) {
+  Threads threads(2);
+  const Scene scene = ball_and_wall(0.5F);
+  const Tracer tracer(scene, threads);
+  const Environment sky = overcast_sky();
+  const Made made = make(tracer, sky, {.degree = 8, .rays = 2048}, threads);
+  const double error = error_of(tracer, sky, made.light, 0.5, threads);
   std::printf("error %.4f, noise %.4f\n", error, made.light.noise);
   EXPECT_LT(error, 0.02);  // .008 measured: bands 0 to 8 of a lobe of roughness .5, and .003 noise of the rays
   EXPECT_LT(made.light.noise, 0.01);
   EXPECT_GT(made.light.noise, 0.001);
 }
 
+TEST(Outgoing, ASmoothBallNeedsTheSkyApart) {
+  Threads threads(2);
+  const Scene scene = ball_and_wall(0.15F);
+  const Tracer tracer(scene, threads);
+  const Environment sky = clear_sky_with_sun();
+  const double series =
+      error_of(tracer, sky, make(tracer, sky, {.degree = 6, .rays = 1024}, threads).light, 0.15, threads);
+  const double apart = error_of(
+      tracer, sky, make(tracer, sky, {.degree = 6, .rays = 1024, .sky_apart = true}, threads).light, 0.15, threads);
+  std::printf("in the series %.3f, apart %.3f\n", series, apart);
+  EXPECT_LT(apart, 0.5 * series);
+}
+
+/// What sees all of the sky leaves nothing of it to the series.
+TEST(Outgoing, InTheOpenTheSkyIsAllApart) {
+  Threads threads(2);
+  Scene scene = testing::empty_scene();
+  const std::uint32_t metal = testing::add_part(scene, {0.9F, 0.6F, 0.3F});
+  testing::add_grid(scene, {-0.4F, 0, -0.4F}, {0, 0, 0.8F}, {0.8F, 0, 0}, 3, 3, metal);
+  Material& m = scene.materials[static_cast<std::size_t>(scene.parts[metal].material)];
+  m.metallic = 1, m.roughness = 0.2F;
+  const Tracer tracer(scene, threads);
+  const Environment sky = clear_sky_with_sun();
+  const std::vector<Vec3f> value(scene.mesh.position.size());
+  const GatherFaces faces(scene);
+  const auto bake = [&](bool apart) {
+    return bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 4, .rays = 512, .sky_apart = apart},
+                         threads);
+  };
+  const auto largest = [](const OutgoingLight& light) {
+    double most = 0;
+    for (const float c : light.field.coefficients) most = std::max(most, std::abs(double{c}));
+    return most;
+  };
+  const OutgoingLight apart = bake(true), series = bake(false);
+  EXPECT_LT(largest(apart), 1e-5 * largest(series));  // floats
+  EXPECT_TRUE(apart.field.has_sky());
+  EXPECT_FALSE(series.field.has_sky());
+  EXPECT_TRUE(series.sky.empty());
+}
+
+TEST(Outgoing, RoughSurfacesKeepNoSkyApart) {
+  EXPECT_EQ(share_apart(0.2, 6), 1);
+  EXPECT_EQ(share_apart(0.8, 6), 0);
+  Threads threads(1);
+  const Scene scene = ball_and_wall(0.9F);
+  const Tracer tracer(scene, threads);
+  const Environment sky = overcast_sky();
+  const std::vector<Vec3f> value(scene.mesh.position.size());
+  const GatherFaces faces(scene);
+  const auto bake = [&](bool apart) {
+    return bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128, .sky_apart = apart},
+                         threads);
+  };
+  const OutgoingLight asked = bake(true), not_asked = bake(false);
+  EXPECT_FALSE(asked.field.has_sky());
+  EXPECT_EQ(asked.field.coefficients, not_asked.field.coefficients);
+}
+
 TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
-  const Scene scene = ball_and_wall();
+  const Scene scene = ball_and_wall(0.5F);
   const Environment sky = overcast_sky();
   std::vector<float> first;
   for (const int count : {1, 3}) {
@@ -93,9 +162,11 @@ TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
     const std::vector<Vec3f> value(scene.mesh.position.size(), {0.5F, 0.5F, 0.5F});
     const GatherFaces faces(scene);
     const OutgoingLight made =
-        bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128}, threads);
-    if (first.empty()) first = made.field.coefficients;
-    EXPECT_EQ(first, made.field.coefficients);
+        bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128, .sky_apart = true}, threads);
+    std::vector<float> numbers = made.field.coefficients;
+    numbers.insert(numbers.end(), made.field.visibility.begin(), made.field.visibility.end());
+    if (first.empty()) first = numbers;
+    EXPECT_EQ(first, numbers);
   }
 }
 
@@ -112,7 +183,7 @@ TEST(Outgoing, WhatGlowsInTheDarkLooksTheSameFromEverywhere) {
       bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 4, .rays = 128}, threads);
   const Triangle& t = scene.mesh.triangles[0];
   for (const Vec3d& v : {Vec3d{0, 1, 0}, normalized(Vec3d{1, 0.1, 0})}) {
-    const Vec3d seen = seen_radiance(made.field, t, 0.3, 0.3, to_double(scene.mesh.normal[t[0]]), v);
+    const Vec3d seen = seen_radiance(made.field, nullptr, {t, 0.3, 0.3, to_double(scene.mesh.normal[t[0]]), v});
     EXPECT_NEAR(seen.x, 1, 1e-5);
     EXPECT_NEAR(seen.y, 2, 1e-5);
     EXPECT_NEAR(seen.z, 3, 1e-5);

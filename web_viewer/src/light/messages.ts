@@ -3,6 +3,7 @@
 
 import type { EquirectMap } from './equirect';
 import type { FieldTexels } from '../asset/light_field';
+import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 
 /// Unpacks a scene.glb, keeps its transfer vectors and hands over the rest.
@@ -70,11 +71,12 @@ export interface ProjectReply {
 export type Reply = { serial: number } & (
   | { begun: true }
   // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
-  // numbers; the light field of each part; the bytes of a progressive mesh
+  // numbers; the light field of each part, and the sky it keeps apart; the bytes of a progressive mesh
   | {
       opened: ArrayBuffer;
       samples: Float32Array | null;
       field: FieldTexels[] | null;
+      sky: SkyData | null;
       progressive: Uint8Array<ArrayBuffer> | null;
     }
   | { values: ValuesReply }

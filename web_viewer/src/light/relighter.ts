@@ -1,6 +1,7 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
 import type { FieldTexels } from '../asset/light_field';
+import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
 
@@ -18,6 +19,8 @@ export class Relighter {
   samples: Float32Array | null = null;
   /// Its light field, for each part; null: it has none.
   field: FieldTexels[] | null = null;
+  /// What that keeps apart; null: nothing.
+  sky: SkyData | null = null;
   /// The bytes of its progressive mesh; null: it has none.
   progressive: Uint8Array<ArrayBuffer> | null = null;
 
@@ -34,7 +37,7 @@ export class Relighter {
   async open(file: ArrayBuffer): Promise<ArrayBuffer> {
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
-    [this.samples, this.field, this.progressive] = [reply.samples, reply.field, reply.progressive];
+    [this.samples, this.field, this.sky, this.progressive] = [reply.samples, reply.field, reply.sky, reply.progressive];
     return reply.opened;
   }
 

@@ -25,6 +25,8 @@ export interface BakedPart {
   geometry: BufferGeometry; // kept here: false colours and light fields put another one in its place
   material: ShaderMaterial;
   unlit: MeshBasicMaterial; // of scene 0, which says opacity and sides
+  albedo: TransferPart['albedo'];
+  finish: Finish | null; // where something mirrors
   light: BufferAttribute;
 }
 
@@ -43,14 +45,15 @@ export class BakedModel {
     this.bounds = new Box3().setFromObject(this.root);
   }
 
-  static async create(asset: LoadedAsset): Promise<BakedModel> {
+  /// `mirrors`: every part's finish will be asked for.
+  static async create(asset: LoadedAsset, mirrors: boolean): Promise<BakedModel> {
     const transfer = await readRadianceTransfer(asset.gltf);
     if (!transfer || transfer.parts.length === 0) throw new Error('this glTF carries no KILN_radiance_transfer');
     const model = new BakedModel(asset, transfer);
     const { glossy } = transfer;
     const lobes = glossy ? lobeTexture(transfer.lobes, glossy.order) : null;
     if (lobes) model.owned.add(lobes);
-    for (const part of transfer.parts) model.parts.push(await model.dress(part, asset, lobes));
+    for (const part of transfer.parts) model.parts.push(await model.dress(part, asset, lobes, mirrors));
     return model;
   }
 
@@ -92,14 +95,21 @@ export class BakedModel {
     for (const { material } of this.parts) material.uniforms.white.value = white;
   }
 
-  private async dress(part: TransferPart, asset: LoadedAsset, lobes: DataTexture | null): Promise<BakedPart> {
+  private async dress(
+    part: TransferPart,
+    asset: LoadedAsset,
+    lobes: DataTexture | null,
+    mirrors: boolean,
+  ): Promise<BakedPart> {
     const geometry = part.geometry;
     const unlit = part.mesh.material as MeshBasicMaterial;
     const glow = await loadGlow(asset, part.material);
     this.owned.add(unlit);
     if (glow) this.owned.add(glow.map);
-    const finish = part.glossy && lobes ? await this.loadFinish(asset, part.material, lobes) : null;
+    const glossy = part.glossy && lobes !== null;
+    const finish = glossy || mirrors ? await loadFinish(asset, part.material) : null;
     if (finish?.map) this.owned.add(finish.map);
+    const arriving = glossy ? { arriving: listTexture(new Float32Array(0)), lobes, order: this.transfer.glossy!.order } : null;
     const light = new BufferAttribute(new Float32Array(3 * geometry.getAttribute('position').count), 3);
     geometry.setAttribute('light', light.setUsage(DynamicDrawUsage));
     const material = bakedMaterial({
@@ -108,23 +118,11 @@ export class BakedModel {
       albedo: part.albedo,
       emission: part.emission,
       vertexAlbedo: geometry.hasAttribute('_albedo'),
-      finish,
+      mirror: finish && arriving && { ...finish, ...arriving },
     });
     part.mesh.material = material;
     const mesh = part.mesh as BakedPart['mesh'];
-    return { mesh, geometry, material, unlit, light };
-  }
-
-  /// Metalness and roughness of an original material.
-  private async loadFinish({ gltf }: LoadedAsset, material: number, lobes: DataTexture): Promise<Finish> {
-    const definition = (gltf.parser.json as { materials?: GltfMaterial[] }).materials?.[material];
-    const finish = definition?.pbrMetallicRoughness ?? {};
-    const { metallicFactor = 1, roughnessFactor = 1, metallicRoughnessTexture } = finish;
-    const loaded: { map?: Texture } = {};
-    if (metallicRoughnessTexture) await gltf.parser.assignTexture(loaded, 'map', metallicRoughnessTexture);
-    const order = this.transfer.glossy!.order;
-    const arriving = listTexture(new Float32Array(0));
-    return { metallic: metallicFactor, roughness: roughnessFactor, map: loaded.map ?? null, arriving, lobes, order };
+    return { mesh, geometry, material, unlit, albedo: part.albedo, finish, light };
   }
 
   dispose(): void {
@@ -167,4 +165,14 @@ export function disposeAll(owned: Iterable<Material | Texture>): void {
     for (const value of Object.values(one)) if ((value as Texture | null)?.isTexture) (value as Texture).dispose();
     one.dispose();
   }
+}
+
+/// Metalness and roughness of an original material.
+async function loadFinish({ gltf }: LoadedAsset, material: number): Promise<Finish> {
+  const definition = (gltf.parser.json as { materials?: GltfMaterial[] }).materials?.[material];
+  const finish = definition?.pbrMetallicRoughness ?? {};
+  const { metallicFactor = 1, roughnessFactor = 1, metallicRoughnessTexture } = finish;
+  const loaded: { map?: Texture } = {};
+  if (metallicRoughnessTexture) await gltf.parser.assignTexture(loaded, 'map', metallicRoughnessTexture);
+  return { metallic: metallicFactor, roughness: roughnessFactor, map: loaded.map ?? null };
 }

@@ -10,13 +10,18 @@ import {
   type Texture,
   Vector3,
 } from 'three';
-import { type FieldTexels, seenRadiance } from '../asset/light_field';
-import { fieldMaterial, fieldTexture } from '../shaders/field_material';
+import { type FieldTexels, type Mirror, seenRadiance } from '../asset/light_field';
+import { MirroredSky, type SkyData } from '../asset/mirrored_sky';
+import { fieldMaterial, fieldTexture, type SkyLook } from '../shaders/field_material';
+import { lobeTexture } from '../shaders/mirror';
+import { skyTexture } from '../shaders/sky_code';
 import type { BakedModel, BakedPart } from './baked_model';
+import { colourAt, finishAt } from './texture_probe';
 
 export type Evaluation = 'fragment' | 'vertex';
 
 interface Dressed {
+  part: BakedPart;
   mesh: Mesh<BufferGeometry, Material>;
   own: { geometry: BufferGeometry; material: Material };
   split: BufferGeometry;
@@ -30,12 +35,20 @@ export class FieldLook {
   readonly degree: number;
   readonly bytes: number; // of its textures
   private readonly parts: Dressed[];
+  /// What the field keeps apart; null: nothing.
+  readonly sky: SkyLook | null = null;
+  private readonly mirrored: MirroredSky | null = null;
 
   /// `most`: texels that a texture may have across. Throws where a part needs more.
-  constructor(model: BakedModel, field: readonly FieldTexels[], most: number) {
+  constructor(model: BakedModel, field: readonly FieldTexels[], sky: SkyData | null, most: number) {
     this.degree = field[0].degree;
     this.bytes = field.reduce((sum, { halves }) => sum + halves.byteLength, 0);
-    this.parts = model.parts.map((part, i) => dress(part, field[i], most));
+    if (sky) {
+      this.mirrored = new MirroredSky(sky);
+      this.sky = { texture: skyTexture(this.mirrored), unit: sky.unit, lobes: lobeTexture(sky.lobes, 1) };
+      this.bytes += this.sky.texture.image.data!.byteLength;
+    }
+    this.parts = model.parts.map((part, i) => dress(part, field[i], this.sky, most));
   }
 
   /// null: the model's own look, where nobody else has put another on it.
@@ -48,7 +61,8 @@ export class FieldLook {
   }
 
   /// Radiance towards an eye from where a ray has hit; undefined: the field is not shown there.
-  seenAt({ object, faceIndex, barycoord, point }: Intersection, eye: Vector3): number[] | undefined {
+  seenAt(hit: Intersection, eye: Vector3): number[] | undefined {
+    const { object, faceIndex, barycoord, point } = hit;
     const part = this.parts.find(({ mesh, split }) => mesh === object && mesh.geometry === split);
     if (!part) return undefined;
     const { index, attributes } = part.own.geometry;
@@ -59,11 +73,14 @@ export class FieldLook {
       normal.addScaledVector(new Vector3().fromBufferAttribute(attributes.normal, v), weights[k]),
     );
     const view = eye.clone().sub(point).normalize();
-    return seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray());
+    const mirror = this.mirrored ? mirrorAt(this.mirrored, part.part, corners, weights) : undefined;
+    return seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray(), mirror);
   }
 
   dispose(): void {
     this.show(null);
+    this.sky?.texture.dispose();
+    this.sky?.lobes.dispose();
     for (const { split, texture, materials } of this.parts) {
       split.dispose();
       texture.dispose();
@@ -72,13 +89,27 @@ export class FieldLook {
   }
 }
 
-function dress({ mesh, geometry, material, unlit }: BakedPart, field: FieldTexels, most: number): Dressed {
+function dress(part: BakedPart, field: FieldTexels, sky: SkyLook | null, most: number): Dressed {
+  const { mesh, geometry, material, unlit, albedo, finish } = part;
   const own = { geometry, material };
   const { texture, texels } = fieldTexture(field, most);
   const vertexAlbedo = own.geometry.hasAttribute('_albedo');
-  const surface = { degree: field.degree, texture, unit: field.unit, unlit, vertexAlbedo };
+  const surface = { shape: field, texture, unit: field.unit, unlit, albedo, finish, sky, vertexAlbedo };
   const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
-  return { mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
+  return { part, mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
+}
+
+/// What the surface makes of the sky there.
+function mirrorAt(
+  sky: MirroredSky,
+  part: BakedPart,
+  corners: readonly number[],
+  weights: readonly number[],
+): Mirror {
+  const base = colourAt(part, corners, weights);
+  const [roughness, metallic] = finishAt(part, corners, weights);
+  const f0 = base.map((c) => 0.04 * (1 - metallic) + c * metallic) as [number, number, number];
+  return { sky, f0, roughness };
 }
 
 const kKept = ['position', 'normal', 'uv', 'uv1', '_albedo'];

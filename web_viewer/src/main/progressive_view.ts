@@ -5,7 +5,7 @@
 import { BufferAttribute, BufferGeometry, type DataTexture, Group, Mesh, type ShaderMaterial } from 'three';
 import { emptyTexels, type FieldTexels, texelWriter } from '../asset/light_field';
 import { ProgressiveMesh } from '../light/progressive_mesh';
-import { fieldMaterial, fieldTexture } from '../shaders/field_material';
+import { fieldMaterial, fieldTexture, type SkyLook } from '../shaders/field_material';
 import { count, percent } from '../ui/format';
 import type { BakedPart } from './baked_model';
 import type { Viewer } from './viewer';
@@ -66,7 +66,7 @@ export class ProgressiveView {
 interface Part {
   mesh: Mesh<BufferGeometry, ShaderMaterial>;
   materials: readonly [ShaderMaterial, ShaderMaterial]; // at each pixel, at the vertices
-  attributes: { from: { values: Float32Array; width: number }; to: Float32Array }[];
+  attributes: { from: { values: Float32Array; width: number }; to: Float32Array; times: readonly number[] | null }[];
   corners: Uint32Array;
   used: number; // triangles
 }
@@ -76,7 +76,7 @@ const kAttributes = [
   ['normal', 'normal'],
   ['uv0', 'uv'],
   ['uv1', 'uv1'],
-  ['color', '_albedo'], // of which only the opacity is looked at
+  ['color', '_albedo'],
 ] as const;
 
 class ProgressiveShape {
@@ -84,23 +84,27 @@ class ProgressiveShape {
   readonly mesh: ProgressiveMesh;
   private readonly base: number;
   private readonly texels: FieldTexels;
+  private readonly write: ReturnType<typeof texelWriter>;
   private readonly texture: DataTexture;
   private readonly parts: Part[];
 
   /// Throws, in words, on bytes that do not fit together or the scene.
-  constructor(bytes: Uint8Array, { model, stage }: Viewer) {
+  constructor(bytes: Uint8Array, { model, stage, level }: Viewer) {
+    const sky = level.field?.sky ?? null;
     this.mesh = new ProgressiveMesh(bytes);
     if (this.mesh.part.some((part) => part >= model.parts.length))
       throw new Error('The progressive mesh has parts that the scene has not.');
     this.base = this.mesh.vertexCount;
     const light = this.mesh.columns.get('coefficients')!;
     const all = light.values.length / light.width;
-    const empty = emptyTexels(this.mesh.degree, all, this.mesh.largest('coefficients'));
+    const shape = { degree: this.mesh.degree, sky: this.mesh.columns.has('visibility') };
+    if (shape.sky && !sky) throw new Error('The progressive mesh sees a sky that the scene has not.');
+    const empty = emptyTexels(shape, all, this.mesh.largest('coefficients'));
     ({ texture: this.texture, texels: this.texels } = fieldTexture(empty, stage.renderer.capabilities.maxTextureSize));
-    const write = texelWriter(this.texels);
-    for (let v = 0; v < all; ++v) write(v, light.values, light.width * v);
+    this.write = texelWriter(this.texels);
+    for (let v = 0; v < all; ++v) this.writeTexels(v);
     this.mesh.touched.clear();
-    this.parts = model.parts.map((part, i) => this.makePart(part, i));
+    this.parts = model.parts.map((part, i) => this.makePart(part, sky, i));
     for (const { mesh } of this.parts) this.group.add(mesh);
     this.group.matrixAutoUpdate = false;
     this.group.matrix.copy(model.parts[0].mesh.matrixWorld); // one node has all parts
@@ -109,17 +113,24 @@ class ProgressiveShape {
 
   /// 0: the base, 1: all; between them vertices grow by the same factor at each step.
   goTo(detail: number, perVertex: boolean): void {
-    const { mesh, base, texels } = this;
+    const { mesh, base } = this;
     const light = mesh.columns.get('coefficients')!;
     const all = light.values.length / light.width;
     const wanted = base * (all / base) ** detail;
     mesh.goTo(all > base ? ((mesh.levels - 1) * (wanted - base)) / (all - base) : 0);
-    const write = texelWriter(texels);
-    for (const v of mesh.touched) write(v, light.values, light.width * v);
+    for (const v of mesh.touched) this.writeTexels(v);
     if (mesh.touched.size > 0) this.texture.needsUpdate = true;
     mesh.touched.clear();
     for (const part of this.parts) part.mesh.material = part.materials[perVertex ? 1 : 0];
     this.fill();
+  }
+
+  private writeTexels(vertex: number): void {
+    const { series, visibility } = this.write;
+    for (const [name, into] of [['coefficients', series], ['visibility', visibility]] as const) {
+      const column = this.mesh.columns.get(name);
+      if (column) into(vertex, column.values, column.width * vertex);
+    }
   }
 
   /// Three vertices of its own for each triangle, as field_material.ts asks for.
@@ -131,8 +142,9 @@ class ProgressiveShape {
       const first = 3 * into.used++;
       for (let k = 0; k < 3; ++k) {
         const v = triangles[3 * t + k];
-        for (const { from, to } of into.attributes)
-          for (let c = 0; c < from.width; ++c) to[from.width * (first + k) + c] = from.values[from.width * v + c];
+        for (const { from, to, times } of into.attributes)
+          for (let c = 0; c < from.width; ++c)
+            to[from.width * (first + k) + c] = from.values[from.width * v + c] * (times?.[c] ?? 1);
         for (let other = 0; other < 3; ++other) into.corners[3 * (first + k) + other] = triangles[3 * t + other];
       }
     }
@@ -143,7 +155,7 @@ class ProgressiveShape {
     }
   }
 
-  private makePart({ unlit, geometry: own }: BakedPart, index: number): Part {
+  private makePart({ unlit, albedo, finish, geometry: own }: BakedPart, sky: SkyLook | null, index: number): Part {
     const { part, triangles, columns } = this.mesh;
     const most = part.length > 0 ? part.reduce((sum, one) => sum + Number(one === index), 0) : triangles.length / 3;
     const geometry = new BufferGeometry();
@@ -153,13 +165,14 @@ class ProgressiveShape {
       if (!from || !own.hasAttribute(shown)) continue;
       const to = new Float32Array(3 * from.width * most);
       geometry.setAttribute(shown, new BufferAttribute(to, from.width));
-      attributes.push({ from, to });
+      // The base colour's factor is in `_albedo` already, but not in colours.
+      attributes.push({ from, to, times: name === 'color' ? [...albedo.slice(0, 3), unlit.opacity] : null });
     }
     const corners = new Uint32Array(9 * most);
     geometry.setAttribute('corners', new BufferAttribute(corners, 3));
     const vertexAlbedo = geometry.hasAttribute('_albedo');
-    const { degree, unit } = this.texels;
-    const surface = { degree, unit, texture: this.texture, unlit, vertexAlbedo };
+    const { unit } = this.texels;
+    const surface = { shape: this.texels, unit, texture: this.texture, unlit, albedo, finish, sky, vertexAlbedo };
     const materials = [fieldMaterial(surface, false), fieldMaterial(surface, true)] as const;
     const mesh = new Mesh(geometry, materials[0]);
     mesh.frustumCulled = false; // its bounds change with the level

@@ -177,11 +177,15 @@ export interface Glow {
   factor: Color;
 }
 
-/// How a part with matrices reflects. The textures belong to the model.
+/// Metalness and roughness. The texture belongs to the model.
 export interface Finish {
   metallic: number;
   roughness: number;
   map: Texture | null; // G roughness, B metallic, as in glTF
+}
+
+/// How a part with matrices reflects.
+export interface Mirrored extends Finish {
   arriving: Texture; // listTexture() of what arrives
   lobes: Texture;
   order: number; // of the matrices
@@ -193,7 +197,7 @@ export interface BakedLook {
   albedo: readonly number[];
   emission: readonly number[];
   vertexAlbedo: boolean;
-  finish: Finish | null; // it has matrices
+  mirror: Mirrored | null; // it has matrices
 }
 
 export const uvOf = (map: Texture): string => (map.channel === 1 ? 'uv1' : 'uv');
@@ -205,18 +209,18 @@ export const transformOf = (map?: Texture | null): Matrix3 => {
 };
 
 /// Owns only itself; the textures belong to the model.
-export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, finish }: BakedLook): ShaderMaterial {
-  const [albedoMap, emissionMap, finishMap] = [unlit.map, glow?.map ?? null, finish?.map ?? null];
+export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, mirror }: BakedLook): ShaderMaterial {
+  const [albedoMap, emissionMap, finishMap] = [unlit.map, glow?.map ?? null, mirror?.map ?? null];
   const defines: Record<string, string> = {};
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (albedoMap) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(albedoMap)];
   if (emissionMap) [defines.EMISSION_MAP, defines.EMISSION_UV] = ['', uvOf(emissionMap)];
   if (finishMap) [defines.FINISH_MAP, defines.FINISH_UV] = ['', uvOf(finishMap)];
   if ([albedoMap, emissionMap, finishMap].some((map) => map?.channel === 1)) defines.USE_UV1_SET = '';
-  if (finish) {
+  if (mirror) {
     defines.MIRROR = '';
-    defines.MIRROR_ORDER = `${finish.order}`;
-    defines.LOBE_TEXELS = `${lobeTexels(finish.order)}`;
+    defines.MIRROR_ORDER = `${mirror.order}`;
+    defines.LOBE_TEXELS = `${lobeTexels(mirror.order)}`;
   }
   return new ShaderMaterial({
     name: unlit.name,
@@ -234,12 +238,12 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, fin
       albedoMapTransform: { value: transformOf(albedoMap) },
       emissionMap: { value: emissionMap },
       emissionMapTransform: { value: transformOf(emissionMap) },
-      metallic: { value: finish?.metallic ?? 0 },
-      roughness: { value: finish?.roughness ?? 1 },
+      metallic: { value: mirror?.metallic ?? 0 },
+      roughness: { value: mirror?.roughness ?? 1 },
       finishMap: { value: finishMap },
       finishMapTransform: { value: transformOf(finishMap) },
-      arriving: { value: finish?.arriving ?? null },
-      lobes: { value: finish?.lobes ?? null },
+      arriving: { value: mirror?.arriving ?? null },
+      lobes: { value: mirror?.lobes ?? null },
     },
     ...sides(unlit),
   });

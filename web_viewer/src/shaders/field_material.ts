@@ -1,21 +1,33 @@
 // The material of light fields: what asset/light_field.ts says, for each fragment, with the three corners' r-RFs as they
 // are. The geometry has three vertices of its own for each triangle (main/field_look.ts): a fragment must know its
 // corners, and WebGL 2 does not tell. Harmonics are evaluated once, whatever the number of corners. Albedo, textures and
-// emission are in the field; of the textures only the opacity counts.
+// emission are in the field; of the textures only the opacity counts. Where the field keeps the sky apart (sky_code.ts),
+// base colour and finish say how a fragment mirrors it.
 //
 // With PER_VERTEX the field is evaluated at the vertices and colours are interpolated (figure 6 of the paper): several
 // times faster, and highlights break at edges.
 
-import { DataTexture, type MeshBasicMaterial, RGBAIntegerFormat, ShaderMaterial, UnsignedIntType } from 'three';
-import { type FieldTexels, fieldCount, halfAt, texelsOf } from '../asset/light_field';
-import { sides, transformOf, uvOf } from './baked_material';
+import {
+  Color,
+  type DataArrayTexture,
+  DataTexture,
+  type MeshBasicMaterial,
+  RGBAIntegerFormat,
+  ShaderMaterial,
+  type Texture,
+  UnsignedIntType,
+} from 'three';
+import { type FieldShape, type FieldTexels, fieldCount, halfAt, skyHalfAt, texelsOf } from '../asset/light_field';
+import { kVisibilityCount } from '../asset/mirrored_sky';
+import { type Finish, sides, transformOf, uvOf } from './baked_material';
 import { harmonicsCode } from './harmonics_code';
+import { skyFunctions } from './sky_code';
 
 /// r-RFs as a texture, and the same r-RFs in its own memory, so that nobody need keep the first ones. No vertex is split
 /// between two rows. Throws where it would be larger than `most` texels across.
 export function fieldTexture(field: FieldTexels, most: number): { texture: DataTexture; texels: FieldTexels } {
-  const { degree, halves } = field;
-  const texels = texelsOf(degree);
+  const { halves } = field;
+  const texels = texelsOf(field);
   const perRow = Math.floor(most / texels);
   const vertices = halves.length / (8 * texels);
   const rows = Math.max(1, Math.ceil(vertices / perRow));
@@ -30,23 +42,25 @@ export function fieldTexture(field: FieldTexels, most: number): { texture: DataT
   return { texture, texels: { ...field, halves: own } };
 }
 
-/// radianceSeen(corners, weights, n, v): both unit, v towards the eye.
-function fieldFunctions(degree: number): string {
-  const products: string[][] = Array.from({ length: texelsOf(degree) }, (_, texel) => [
+/// radianceSeen(corners, weights, n, v, mirror): n and v are unit, v towards the eye; mirror is F0 and roughness.
+function fieldFunctions(shape: FieldShape): string {
+  const { degree } = shape;
+  const products: string[][] = Array.from({ length: texelsOf(shape) }, (_, texel) => [
     `fetchEight(a, b, c, weights, ${texel}, low, high);`,
   ]);
+  const put = (half: number, code: (one: string) => string) =>
+    products[half >> 3].push(code(`${half & 4 ? 'high' : 'low'}.${'xyzw'[half & 3]}`));
   for (let c = 0; c < 3; ++c)
-    for (let i = 0; i < fieldCount(degree); ++i) {
-      const half = halfAt(degree, i, c);
-      const one = `${half & 4 ? 'high' : 'low'}.${'xyzw'[half & 3]}`;
-      products[half >> 3].push(`sum.${'rgb'[c]} += ${one} * y${i};`);
-    }
+    for (let i = 0; i < fieldCount(degree); ++i)
+      put(halfAt(degree, i, c), (one) => `sum.${'rgb'[c]} += ${one} * y${i};`);
+  for (let i = 0; shape.sky && i < kVisibilityCount; ++i)
+    put(skyHalfAt(degree, i), (one) => `visibility[${i}] = ${one};`);
   return /* glsl */ `
 uniform highp usampler2D field;
 uniform float fieldUnit;
 ivec2 placeOf(int vertex) {
-  int perRow = textureSize(field, 0).x / ${texelsOf(degree)};
-  return ivec2((vertex % perRow) * ${texelsOf(degree)}, vertex / perRow);
+  int perRow = textureSize(field, 0).x / ${texelsOf(shape)};
+  return ivec2((vertex % perRow) * ${texelsOf(shape)}, vertex / perRow);
 }
 vec4 four(uvec2 pairs) { return vec4(unpackHalf2x16(pairs.x), unpackHalf2x16(pairs.y)); }
 void fetchEight(ivec2 a, ivec2 b, ivec2 c, vec3 weights, int texel, out vec4 low, out vec4 high) {
@@ -55,18 +69,23 @@ void fetchEight(ivec2 a, ivec2 b, ivec2 c, vec3 weights, int texel, out vec4 low
   low = weights.x * four(p.xy) + weights.y * four(q.xy) + weights.z * four(r.xy);
   high = weights.x * four(p.zw) + weights.y * four(q.zw) + weights.z * four(r.zw);
 }
-vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 n, vec3 v) {
+${shape.sky ? skyFunctions : ''}
+vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 n, vec3 v, vec4 mirror) {
   float above = dot(n, v);
   vec3 raised = v - min(above, 0.0) * n;
   float size = length(raised);
-  vec3 r = 2.0 * max(above, 0.0) * n - (size > 0.0 ? raised / size : n);
+  vec3 seen = size > 0.0 ? raised / size : n;
+  vec3 r = 2.0 * max(above, 0.0) * n - seen;
   float x = r.x, y = r.y, z = r.z;
   ${harmonicsCode(degree)}
   ivec2 a = placeOf(corners.x), b = placeOf(corners.y), c = placeOf(corners.z);
   vec3 sum = vec3(0.0);
   vec4 low, high;
+  ${shape.sky ? `float visibility[${kVisibilityCount}];` : ''}
   ${products.flat().join('\n  ')}
-  return max(fieldUnit * sum, vec3(0.0));
+  sum *= fieldUnit;
+  ${shape.sky ? 'sum += mirroredSky(n, seen, mirror.rgb, mirror.a, visibility);' : ''}
+  return max(sum, vec3(0.0));
 }`;
 }
 
@@ -81,12 +100,44 @@ centroid varying vec3 vNormal;
 centroid varying vec3 vToEye;
 #endif
 #ifdef VERTEX_ALBEDO
-varying float vAlpha;
+varying vec4 vAlbedo;
 #endif
 #ifdef ALBEDO_MAP
 varying vec2 vAlbedoUv;
 #endif
+#ifdef FINISH_MAP
+varying vec2 vFinishUv;
+#endif
 `;
+
+// Both shaders: base colour and opacity, and what of them mirrors.
+const surfaceFunctions = /* glsl */ `
+uniform vec4 albedo;
+#ifdef ALBEDO_MAP
+uniform sampler2D albedoMap;
+#endif
+uniform float metallic;
+uniform float roughness;
+#ifdef FINISH_MAP
+uniform sampler2D finishMap;
+#endif
+vec4 baseHere() {
+  vec4 base = albedo;
+#ifdef VERTEX_ALBEDO
+  base = vAlbedo;
+#endif
+#ifdef ALBEDO_MAP
+  base *= textureHere(albedoMap, vAlbedoUv);
+#endif
+  return base;
+}
+vec4 mirrorOf(vec3 base) {
+  vec2 finish = vec2(roughness, metallic);
+#ifdef FINISH_MAP
+  finish *= textureHere(finishMap, vFinishUv).gb;
+#endif
+  return vec4(mix(vec3(0.04), base, finish.y), finish.x);
+}`;
 
 const vertexShader = (functions: string) => /* glsl */ `
 ${varyings}
@@ -97,96 +148,117 @@ attribute vec4 _albedo;
 #ifdef ALBEDO_MAP
 uniform mat3 albedoMapTransform;
 #endif
+#ifdef FINISH_MAP
+uniform mat3 finishMapTransform;
+#endif
 #ifdef USE_UV1_SET
 attribute vec2 uv1;
 #endif
 #ifdef PER_VERTEX
+vec4 textureHere(sampler2D map, vec2 uv) { return textureLod(map, uv, 0.0); }
+${surfaceFunctions}
 ${functions}
 #endif
 void main() {
   int own = gl_VertexID % 3;
   vec3 n = mat3(modelMatrix) * normal;
   vec3 toEye = cameraPosition - (modelMatrix * vec4(position, 1.0)).xyz;
+#ifdef VERTEX_ALBEDO
+  vAlbedo = _albedo;
+#endif
+#ifdef ALBEDO_MAP
+  vAlbedoUv = (albedoMapTransform * vec3(ALBEDO_UV, 1.0)).xy;
+#endif
+#ifdef FINISH_MAP
+  vFinishUv = (finishMapTransform * vec3(FINISH_UV, 1.0)).xy;
+#endif
 #ifdef PER_VERTEX
   ivec3 here = ivec3(int(corners[own]));
-  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), normalize(n), normalize(toEye));
+  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), normalize(n), normalize(toEye), mirrorOf(baseHere().rgb));
 #else
   vCorners = ivec3(corners);
   vWeights = vec3(own == 0, own == 1, own == 2);
   vNormal = n;
   vToEye = toEye;
 #endif
-#ifdef VERTEX_ALBEDO
-  vAlpha = _albedo.a;
-#endif
-#ifdef ALBEDO_MAP
-  vAlbedoUv = (albedoMapTransform * vec3(ALBEDO_UV, 1.0)).xy;
-#endif
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
 const fragmentShader = (functions: string) => /* glsl */ `
 ${varyings}
-uniform float alpha;
 uniform float alphaCutoff;
-#ifdef ALBEDO_MAP
-uniform sampler2D albedoMap;
-#endif
+vec4 textureHere(sampler2D map, vec2 uv) { return texture2D(map, uv); }
+${surfaceFunctions}
 #ifndef PER_VERTEX
 ${functions}
 #endif
 #include <common>
 #include <dithering_pars_fragment>
 void main() {
-  float opacity = alpha;
-#ifdef VERTEX_ALBEDO
-  opacity = vAlpha;
-#endif
-#ifdef ALBEDO_MAP
-  opacity *= texture2D(albedoMap, vAlbedoUv).a;
-#endif
-  if (opacity < alphaCutoff) discard;
+  vec4 base = baseHere();
+  if (base.a < alphaCutoff) discard;
 #ifdef PER_VERTEX
   vec3 seen = vSeen;
 #else
-  vec3 seen = radianceSeen(vCorners, vWeights, normalize(vNormal), normalize(vToEye));
+  vec3 seen = radianceSeen(vCorners, vWeights, normalize(vNormal), normalize(vToEye), mirrorOf(base.rgb));
 #endif
-  gl_FragColor = vec4(seen, opacity);
+  gl_FragColor = vec4(seen, base.a);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
   #include <dithering_fragment>
 }`;
 
+/// The sky of a light field, and the table of lobes (mirror.ts).
+export interface SkyLook {
+  texture: DataArrayTexture;
+  unit: number;
+  lobes: Texture;
+}
+
 export interface FieldSurface {
-  degree: number;
+  shape: FieldShape;
   texture: DataTexture; // of fieldTexture()
   unit: number; // of FieldTexels
-  unlit: MeshBasicMaterial; // of scene 0: opacity and sides
+  unlit: MeshBasicMaterial; // of scene 0: base colour texture, opacity and sides
+  albedo: readonly number[];
+  finish: Finish | null;
+  sky: SkyLook | null;
   vertexAlbedo: boolean; // the geometry has `_albedo`
 }
 
 /// Owns only itself; the textures belong to others.
 export function fieldMaterial(surface: FieldSurface, perVertex: boolean): ShaderMaterial {
-  const { degree, texture, unit, unlit, vertexAlbedo } = surface;
+  const { shape, texture, unit, unlit, albedo, finish, sky, vertexAlbedo } = surface;
   const defines: Record<string, string> = {};
-  const map = unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
+  const map = sky || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
+  const finishMap = sky ? (finish?.map ?? null) : null;
   if (perVertex) defines.PER_VERTEX = '';
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (map) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(map)];
-  if (map?.channel === 1) defines.USE_UV1_SET = '';
+  if (finishMap) [defines.FINISH_MAP, defines.FINISH_UV] = ['', uvOf(finishMap)];
+  if ([map, finishMap].some((one) => one?.channel === 1)) defines.USE_UV1_SET = '';
+  const functions = fieldFunctions(shape);
+  const { r, g, b } = new Color().setRGB(albedo[0], albedo[1], albedo[2]);
   return new ShaderMaterial({
     name: unlit.name,
     dithering: true, // as the material of baked light
-    vertexShader: vertexShader(fieldFunctions(degree)),
-    fragmentShader: fragmentShader(fieldFunctions(degree)),
+    vertexShader: vertexShader(functions),
+    fragmentShader: fragmentShader(functions),
     defines,
     uniforms: {
       field: { value: texture },
       fieldUnit: { value: unit },
-      alpha: { value: unlit.opacity },
+      sky: { value: sky?.texture ?? null },
+      skyUnit: { value: sky?.unit ?? 1 },
+      lobes: { value: sky?.lobes ?? null },
+      albedo: { value: [r, g, b, unlit.opacity] },
       alphaCutoff: { value: unlit.alphaTest },
       albedoMap: { value: map },
       albedoMapTransform: { value: transformOf(map) },
+      metallic: { value: finish?.metallic ?? 0 },
+      roughness: { value: finish?.roughness ?? 1 },
+      finishMap: { value: finishMap },
+      finishMapTransform: { value: transformOf(finishMap) },
     },
     ...sides(unlit),
   });

@@ -1,0 +1,62 @@
+#include "core/bake/sky_apart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/bake/plan.h"
+#include "core/lightfield/outgoing.h"
+#include "core/sphere/sh.h"
+#include "core/trace/surface.h"
+
+namespace kiln {
+namespace {
+
+/// Of the faces' middles.
+double least_roughness(const Scene& scene) {
+  double least = 1;
+  for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
+    constexpr float kThird = 1.0F / 3;
+    least = std::min(least, double{finish_at(scene, surface_point(scene, t, kThird, kThird)).roughness});
+  }
+  return least;
+}
+
+}  // namespace
+
+double left_by_bands(const Environment& sky, int degree) {
+  constexpr int kHeight = 64;
+  const Environment map = averaged_sky(kHeight, 4, [&](const Vec3f& w) { return environment_radiance(sky, w); });
+  const std::vector<Vec3f> c = project_environment(map, degree + 1);
+  double squares = 0, mean = 0, held = 0;
+  for (int y = 0; y < map.height; ++y) {
+    const double area = std::cos(std::numbers::pi * y / kHeight) - std::cos(std::numbers::pi * (y + 1) / kHeight);
+    for (int x = 0; x < map.width; ++x) {
+      const Vec3d l = to_double(map.radiance[static_cast<std::size_t>(y * map.width + x)]);
+      squares += area * dot(l, l);
+      mean += area * (l.x + l.y + l.z);
+    }
+  }
+  const double all = 2.0 * map.width;  // sum of the areas
+  for (const Vec3f& ci : c) held += double{dot(ci, ci)} / (4 * std::numbers::pi);
+  const double level = mean / (3 * all), left = std::max(0.0, squares / all - held) / 3;
+  return level > 0 ? std::sqrt(left) / level : 0;
+}
+
+SkyDecision decide_sky(const Scene& scene, const Environment* sky, int degree, double share, SkyPart asked) {
+  const std::string because = asked == SkyPart::automatic ? "" : "asked for by the recipe";
+  if (sky == nullptr) return {false, "there is none"};
+  if (degree + 1 < kVisibilityOrder) return {false, "the series has fewer bands than what is seen of the sky"};
+  if (asked == SkyPart::series) return {false, because};
+  const double smooth = least_roughness(scene);
+  const std::string roughness = "roughness " + short_text(smooth);
+  if (!(share_apart(smooth, degree) > 0))
+    return {false, "the smoothest surface has " + roughness + ": the series holds it"};
+  if (asked == SkyPart::apart) return {true, because};
+  const double left = left_by_bands(*sky, degree);
+  const std::string bands = std::to_string(degree + 1) + " bands leave " + short_text(100 * left) + " % of the sky out";
+  if (left <= share) return {false, bands};
+  return {true, "surfaces of " + roughness + " mirror it, and " + bands};
+}
+
+}  // namespace kiln
