@@ -49,10 +49,10 @@ float level_error(const ProgressiveMesh&, std::size_t splits);
 /// The finest level of at most so many triangles; 0 where there is none.
 std::size_t level_of_triangles(const ProgressiveMesh&, std::size_t triangles);
 
-/// The bytes of KILN_progressive_mesh, which README.md specifies. `rows`: a mean r-RF and what a weight of 1 adds to it,
-/// each 3 count() numbers, at right angles to each other, falling (core/prt/components.h); then light is weights, each
-/// over its own range: in 8 bits from where that is as fine as `step`, before that in 16. None: float32. All else is as
-/// it was, bit by bit.
+/// The bytes of KILN_progressive_mesh, which README.md specifies. `rows`: a mean r-RF and what a weight of 1 adds to
+/// it, each 3 count() numbers, at right angles to each other, falling (core/prt/components.h); then light is weights,
+/// each over its own range: in 8 bits from where that is as fine as `step`, before that in 16. None: float32. All else
+/// is as it was, bit by bit.
 std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh&, std::span<const float> rows = {}, double step = 0);
 
 /// Reads untrusted bytes; every count, index and number is checked. Fails with unsupported_version, truncated,
