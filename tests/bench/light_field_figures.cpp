@@ -68,9 +68,11 @@ Seen look(const LitMesh& lit, const Window& window, Threads& threads) {
   Seen out{std::vector<Vec3d>(pixels), std::vector<std::uint8_t>(pixels, 1)};
   threads.for_blocks(pixels, width, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t column = i % width, row = i / width;
       for (int ray = 0; ray < kGrid * kGrid; ++ray) {
-        const double x = static_cast<double>(i % width) + (ray % kGrid + 0.5) / kGrid - window.width / 2.0;
-        const double y = window.height / 2.0 - static_cast<double>(i / width) - (ray / kGrid + 0.5) / kGrid;
+        const int across = ray % kGrid, down = ray / kGrid;
+        const double x = static_cast<double>(column) + (across + 0.5) / kGrid - window.width / 2.0;
+        const double y = window.height / 2.0 - static_cast<double>(row) - (down + 0.5) / kGrid;
         const Vec3d from = window.middle + window.right * (x * window.pixel) + window.up * (y * window.pixel);
         const Hit hit = tracer.closest(to_float(from), to_float(-window.back), 10);
         if (!hit) {
