@@ -44,7 +44,8 @@ TEST(CarriedBake, SimplifiesWithoutARayAndLevelsGetWorse) {
   const BakeOutput out = baked(carried_input(
       captured, R"({"steps":[{"do":"lightfield","simplify":{"ratio":0.25},"lods":2,"progressive":true,"rays":64}],
                     "environment":{"builtin":"clear"}})"));
-  const nlohmann::json report = report_of(out), field = report["lightfield"];
+  const nlohmann::json report = report_of(out);
+  const nlohmann::json& field = report["lightfield"];
   EXPECT_EQ(report["rays"], 0);
   EXPECT_EQ(report["plan"][0]["value"], "that of the file");
   EXPECT_TRUE(report["certificate"].is_null());  // of diffuse light, which there is none of
