@@ -38,7 +38,8 @@ LightFieldStage::LightFieldStage(BakedScene& baked, OutgoingLight outgoing, Plan
              (first.reached ? "" : "; topology or shape allow no fewer"));
   encoding_ = choose_field_encoding(first.field, first.mesh, plan);
   outcome_.rank = encoding_.components.rank();
-  if (levels_.progressive) progressive_ = encode_progressive(*levels_.progressive, encoding_.components.rows);
+  if (levels_.progressive)
+    progressive_ = encode_progressive(*levels_.progressive, encoding_.components.rows, encoding_.weight_step);
   levels_.progressive.reset();
   for (std::size_t k = 0; k < levels_.levels.size(); ++k)
     outcome_.levels.push_back(report_of(levels_.levels[k], k == 0 ? "scene.glb" : "lod" + std::to_string(k) + ".glb"));

@@ -20,7 +20,7 @@ constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8
 
 struct Header {
   std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
-                splits = 0, turned = 0, moved = 0, rank = 0;
+                splits = 0, turned = 0, moved = 0, rank = 0, wide = 0;
 
   std::size_t stride() const { return 3 * static_cast<std::size_t>(sh_count(static_cast<int>(degree) + 1)); }
   std::size_t row_floats() const { return rank == 0 ? 0 : (rank + 1) * stride(); }
@@ -32,11 +32,16 @@ struct StoredSplit {
   float error = 0;
 };
 
-/// Light as weights of rows: weight k of a vertex is offset[k] + scale[k] code[rank vertex + k]. Arrays of codes have
-/// an even length. Empty where the rank is 0.
+/// Codes of vertices: of the first `wide` weights in 16 bits, of the others in 8. Lengths fill words.
+struct Codes {
+  std::vector<std::uint16_t> wide;
+  std::vector<std::uint8_t> narrow;
+};
+
+/// Light as weights of rows: weight k of a vertex is offset[k] + scale[k] code. Empty where the rank is 0.
 struct LightCode {
   std::vector<float> scale, offset, rows;  // rows: the mean, then one for each weight
-  std::vector<std::uint16_t> all, moved;
+  Codes all, moved;
 };
 
 /// What the file has in another form than ProgressiveMesh.
@@ -63,7 +68,8 @@ void each_array(Progressive& p, AnyStored& stored, const Header& h, const Visit&
     if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
     if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
     visit(lit.field.coefficients, h.rank == 0 ? count * h.stride() : 0);
-    visit(codes, (count * h.rank + 1) / 2 * 2);
+    visit(codes.wide, (count * h.wide + 1) / 2 * 2);
+    visit(codes.narrow, (count * (h.rank - h.wide) + 3) / 4 * 4);
   };
   visit(stored.light.scale, h.rank);
   visit(stored.light.offset, h.rank);
@@ -99,27 +105,35 @@ std::vector<double> weights_of(const LightField& field, std::span<const float> r
   return out;
 }
 
-LightCode encode_light(const ProgressiveMesh& p, std::span<const float> rows, std::size_t rank) {
+/// Sets header.wide.
+LightCode encode_light(const ProgressiveMesh& p, std::span<const float> rows, double step, Header& h) {
   LightCode out{.rows = {rows.begin(), rows.end()}};
   const std::vector<double> all = weights_of(p.all.field, rows), moved = weights_of(p.moved.field, rows);
-  constexpr double kSteps = 65535;
-  for (std::size_t k = 0; k < rank; ++k) {
+  constexpr double kWide = 65535, kNarrow = 255;
+  std::vector<double> range;
+  for (std::size_t k = 0; k < h.rank; ++k) {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (const auto* weights : {&all, &moved}) {
-      for (std::size_t i = k; i < weights->size(); i += rank)
+      for (std::size_t i = k; i < weights->size(); i += h.rank)
         low = std::min(low, (*weights)[i]), high = std::max(high, (*weights)[i]);
     }
     out.offset.push_back(static_cast<float>(low));
-    out.scale.push_back(static_cast<float>((high - low) / kSteps));
+    range.push_back(high - low);
+    if (range[k] > kNarrow * step) h.wide = static_cast<std::uint32_t>(k) + 1;
   }
+  for (std::size_t k = 0; k < h.rank; ++k)
+    out.scale.push_back(static_cast<float>(range[k] / (k < h.wide ? kWide : kNarrow)));
   const auto encode = [&](const std::vector<double>& weights) {
-    std::vector<std::uint16_t> codes;
-    codes.reserve(weights.size() + 1);
+    Codes codes;
     for (std::size_t i = 0; i < weights.size(); ++i) {
-      const double scale = out.scale[i % rank], steps = scale > 0 ? (weights[i] - out.offset[i % rank]) / scale : 0;
-      codes.push_back(static_cast<std::uint16_t>(std::lround(std::clamp(steps, 0.0, kSteps))));
+      const std::size_t k = i % h.rank;
+      const double scale = out.scale[k], steps = scale > 0 ? (weights[i] - out.offset[k]) / scale : 0;
+      const auto code = std::lround(std::clamp(steps, 0.0, k < h.wide ? kWide : kNarrow));
+      if (k < h.wide) codes.wide.push_back(static_cast<std::uint16_t>(code));
+      if (k >= h.wide) codes.narrow.push_back(static_cast<std::uint8_t>(code));
     }
-    if (codes.size() % 2 != 0) codes.push_back(0);
+    codes.wide.resize((codes.wide.size() + 1) / 2 * 2);
+    codes.narrow.resize((codes.narrow.size() + 3) / 4 * 4);
     return codes;
   };
   out.all = encode(all), out.moved = encode(moved);
@@ -127,15 +141,16 @@ LightCode encode_light(const ProgressiveMesh& p, std::span<const float> rows, st
 }
 
 /// Sums in this order, in double, rounded once: the viewer does the same.
-void decode_light(const LightCode& light, const std::vector<std::uint16_t>& codes, std::size_t vertices,
-                  LightField& field) {
-  const std::size_t stride = 3 * field.count(), rank = light.scale.size();
+void decode_light(const Header& h, const LightCode& light, const Codes& codes, LightField& field) {
+  const std::size_t stride = h.stride(), narrow = h.rank - h.wide;
+  const std::size_t vertices = &codes == &light.all ? h.vertices : h.moved;
   field.coefficients.resize(stride * vertices);
   std::vector<double> sum(stride);
   for (std::size_t v = 0; v < vertices; ++v) {
     std::copy_n(light.rows.begin(), stride, sum.begin());
-    for (std::size_t k = 0; k < rank; ++k) {
-      const double weight = double{light.offset[k]} + double{light.scale[k]} * codes[rank * v + k];
+    for (std::size_t k = 0; k < h.rank; ++k) {
+      const int code = k < h.wide ? codes.wide[h.wide * v + k] : codes.narrow[narrow * v + k - h.wide];
+      const double weight = double{light.offset[k]} + double{light.scale[k]} * code;
       const float* row = light.rows.data() + (k + 1) * stride;
       for (std::size_t s = 0; s < stride; ++s) sum[s] += weight * row[s];
     }
@@ -215,7 +230,7 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span<const float> rows) {
+std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span<const float> rows, double step) {
   const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
            .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0),
@@ -231,7 +246,7 @@ std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span
     EXPECTS(rows.size() % h.stride() == 0);
     h.rank = static_cast<std::uint32_t>(rows.size() / h.stride() - 1);
   }
-  if (h.rank > 0) stored.light = encode_light(p, rows, h.rank);
+  if (h.rank > 0) stored.light = encode_light(p, rows, step, h);
   stored.splits.reserve(p.splits.size());
   for (const VertexSplit& s : p.splits) {
     EXPECTS(s.moved <= kMostMoved);
@@ -256,7 +271,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
   if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 63 ||
-      h.rank > h.stride())
+      h.rank > h.stride() || h.wide > h.rank)
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
     return fault("slot_count_mismatch", "The base is larger than the whole.", "header");
@@ -285,8 +300,8 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
                         .turned = s.turned,
                         .error = s.error});
   if (h.rank > 0) {
-    decode_light(stored.light, stored.light.all, h.vertices, p.all.field);
-    decode_light(stored.light, stored.light.moved, h.moved, p.moved.field);
+    decode_light(h, stored.light, stored.light.all, p.all.field);
+    decode_light(h, stored.light, stored.light.moved, p.moved.field);
   }
   if (!all_finite(p.all)) return fault("number_out_of_range", "A vertex has a number that is not finite.", "vertices");
   if (!all_finite(p.moved)) return fault("number_out_of_range", "A row has a number that is not finite.", "moved rows");

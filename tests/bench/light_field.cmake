@@ -1,5 +1,6 @@
-add_executable(kiln_light_field_bench light_field.cpp light_field_compare.cpp light_field_models.cpp light_field_qem.cpp)
+add_executable(kiln_light_field_bench light_field.cpp light_field_compare.cpp light_field_figures.cpp light_field_models.cpp light_field_qem.cpp)
 set_target_properties(kiln_light_field_bench PROPERTIES OUTPUT_NAME kiln_light_field)
 kiln_flags(kiln_light_field_bench)
-target_link_libraries(kiln_light_field_bench PRIVATE kiln_lightfield kiln_light_field_bake kiln_import kiln_prt kiln_trace Eigen3::Eigen)
+target_link_libraries(kiln_light_field_bench PRIVATE kiln_lightfield kiln_light_field_bake kiln_import kiln_baked_scene kiln_prt kiln_trace Eigen3::Eigen)
 target_compile_definitions(kiln_light_field_bench PRIVATE KILN_BENCH_FOLDER="${CMAKE_CURRENT_LIST_DIR}")
+set_source_files_properties(light_field_figures.cpp PROPERTIES INCLUDE_DIRECTORIES /usr/include/stb)

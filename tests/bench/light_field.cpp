@@ -1,6 +1,7 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
 //   kiln_light_field all MODELS                        the tables of core/lightfield/README.md; MODELS: shared/models
 //   kiln_light_field scale VERTICES [DEGREE] [RATIO]   time and memory of one simplification
+//   kiln_light_field figures MODELS FOLDER             its pictures: figure7.jpg, figure8.jpg, figure9.jpg
 #include <sys/resource.h>
 
 #include <array>
@@ -12,11 +13,13 @@
 
 #include "core/base/random.h"
 #include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/mean_radiance.h"
 #include "core/lightfield/simplify.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/sampling.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/light_field_compare.h"
+#include "tests/bench/light_field_figures.h"
 #include "tests/bench/light_field_models.h"
 
 namespace kiln::bench {
@@ -224,25 +227,34 @@ void measure_against_colours(const char* bench, const LitMesh& lit, double ratio
   }
 }
 
-/// Figure 7: at equal memory, fewer vertices against fewer bands.
-void measure_degrees(const std::string& model, int degree, int less) {
+LitMesh bronze_statue(const std::string& model, int degree) {
   Threads threads;
   LitMesh lit{.mesh = load_model(model), .field = {}};
   const Coat bronze{.roughness = 0.3, .f0 = {0.7F, 0.5F, 0.3F}, .albedo = {0.02F, 0.02F, 0.02F}};
   const Coat patina{.roughness = 0.45, .f0 = {0.3F, 0.4F, 0.35F}, .albedo = {0.05F, 0.15F, 0.12F}};
   const auto here = [](const Vec3f& p) { return noise(p, 0.1F); };
   lit.field = shine(lit.mesh, degree, bronze, patina, here, threads);
-  // Fitted anew: the first bands of the higher fit would be a third worse.
-  const LitMesh reduced{.mesh = lit.mesh, .field = shine(lit.mesh, less, bronze, patina, here, threads)};
+  return lit;
+}
+
+/// As many triangles of `whole` as take the bytes of `reduced`.
+std::size_t equal_memory(const LitMesh& whole, const LitMesh& reduced) {
+  return static_cast<std::size_t>(bytes_of(reduced) / bytes_of(whole) *
+                                  static_cast<double>(whole.mesh.triangles.size()));
+}
+
+/// Figure 7: at equal memory, fewer vertices against fewer bands. Those are fitted anew: the first bands of the higher
+/// fit would be a third worse.
+void measure_degrees(const std::string& model, int degree, int less) {
+  const LitMesh lit = bronze_statue(model, degree), reduced = bronze_statue(model, less);
   tell("figure 7", "degree reduction", lit, reduced, 0);
-  const double bytes = bytes_of(reduced), whole = bytes_of(lit);
-  const auto target = static_cast<std::size_t>(bytes / whole * static_cast<double>(lit.mesh.triangles.size()));
+  const std::size_t target = equal_memory(lit, reduced);
   tell_ours("figure 7", "ours, edge", lit, {.triangles = target});
   tell_ours("figure 7", "ours, half-edge", lit, {.triangles = target, .collapse = Collapse::half_edge});
 }
 
-/// Figure 8: diffuse stripes on a specular sphere; of a paint of their own, and of one that sends the same mean colour.
-void measure_stripes() {
+/// Diffuse stripes on a specular sphere: of a paint of their own, or of one that sends the same mean colour.
+LitMesh striped_sphere(bool one_mean) {
   Threads threads;
   LitMesh lit{.mesh = cube_sphere(50), .field = {}};
   const Coat diffuse{.roughness = 1, .f0 = {}, .albedo = {0.5F, 0.4F, 0.3F}};
@@ -250,25 +262,30 @@ void measure_stripes() {
   const auto stripe = [](const Vec3f& p) {
     return std::clamp(0.5F + 4 * std::sin(25 * (p.x + 0.3F * p.y)), 0.0F, 1.0F);
   };
-  lit.field = shine(lit.mesh, 4, diffuse, specular, stripe, threads);
-  for (const Collapse how : {Collapse::half_edge, Collapse::edge})
-    measure_against_colours("figure 8, two paints", lit, 0.5, how);
-  lit.field = shine(lit.mesh, 4, specular, specular, stripe, threads);
-  const std::vector<Vec3d> mean = mean_radiance(lit);
+  lit.field = shine(lit.mesh, 4, one_mean ? specular : diffuse, specular, stripe, threads);
+  if (!one_mean) return lit;
+  const std::vector<Vec3f> mean = mean_radiance(lit.field, lit.mesh.normal);
   const std::size_t count = lit.field.count();
   for (std::size_t v = 0; v < mean.size(); ++v) {
     const float share = stripe(lit.mesh.position[v]);
     for (std::size_t c = 0; c < 3; ++c) {
       for (std::size_t i = 0; i < count; ++i) lit.field.of(v)[c * count + i] *= share;
-      lit.field.of(v)[c * count] += (1 - share) * static_cast<float>(mean[v][c]) / 0.28209479F;
+      lit.field.of(v)[c * count] += (1 - share) * mean[v][c] / 0.28209479F;
     }
   }
-  for (const Collapse how : {Collapse::half_edge, Collapse::edge})
-    measure_against_colours("figure 8, one mean colour", lit, 0.5, how);
+  return lit;
 }
 
-/// Figure 9: diffuse veins.
-void measure_diffuse(const std::string& model) {
+/// Figure 8.
+void measure_stripes() {
+  for (const bool one_mean : {false, true}) {
+    const LitMesh lit = striped_sphere(one_mean);
+    for (const Collapse how : {Collapse::half_edge, Collapse::edge})
+      measure_against_colours(one_mean ? "figure 8, one mean colour" : "figure 8, two paints", lit, 0.5, how);
+  }
+}
+
+LitMesh veined(const std::string& model) {
   Threads threads;
   LitMesh lit{.mesh = load_model(model), .field = {}};
   lit.field = bake_colours(lit.mesh, threads);
@@ -276,9 +293,52 @@ void measure_diffuse(const std::string& model) {
     const Vec3f albedo = veins(lit.mesh.position[v]).albedo;
     for (std::size_t c = 0; c < 3; ++c) lit.field.of(v)[c] *= albedo[c];
   }
+  return lit;
+}
+
+/// Figure 9: diffuse veins.
+void measure_diffuse(const std::string& model) {
+  const LitMesh lit = veined(model);
   for (const double ratio : {0.25, 0.015})
     for (const Collapse how : {Collapse::half_edge, Collapse::edge})
       measure_against_colours("figure 9", lit, ratio, how);
+}
+
+/// At the weight of the tables that is best for light.
+LitMesh best_colour_qem(const LitMesh& lit, std::size_t triangles, Collapse how) {
+  LitMesh best;
+  double least = HUGE_VAL;
+  for (const double weight : {0.01, 0.03, 0.1, 0.3, 1.0}) {
+    LitMesh found = simplify_colour_qem(lit, triangles, how, weight);
+    const double error = compare(lit, found).light;
+    if (error < least) least = error, best = std::move(found);
+  }
+  return best;
+}
+
+/// The paper's three comparisons as pictures.
+bool draw_figures(const std::string& models, const std::string& folder) {
+  Threads threads;
+  const auto ours = [&](const LitMesh& lit, std::size_t triangles, Collapse how) {
+    return simplify(lit, {.triangles = triangles, .collapse = how}, threads).lit;
+  };
+  const LitMesh statue = bronze_statue(models + "/scenes/buddha/buddha.glb", 8),
+                fewer_bands = bronze_statue(models + "/scenes/buddha/buddha.glb", 3);
+  const LitMesh fewer_vertices = ours(statue, equal_memory(statue, fewer_bands), Collapse::edge);
+  bool written = write_figure(folder + "/figure7.jpg", {statue, fewer_vertices, fewer_bands},
+                              {.back = {0.3, -1, 0.15}, .up = {0, 0, 1}, .height = 420, .scale = 0.5}, threads);
+  const LitMesh stripes = striped_sphere(true);
+  const std::size_t half = stripes.mesh.triangles.size() / 2;
+  written &= write_figure(
+      folder + "/figure8.jpg",
+      {stripes, ours(stripes, half, Collapse::half_edge), best_colour_qem(stripes, half, Collapse::half_edge)},
+      {.back = {0.3, 0.5, 1}, .height = 190, .scale = 0.2}, threads);
+  const LitMesh skull = veined(models + "/scenes/skull/skull.glb");
+  const std::size_t few = skull.mesh.triangles.size() * 15 / 1000;
+  written &= write_figure(folder + "/figure9.jpg",
+                          {skull, ours(skull, few, Collapse::edge), best_colour_qem(skull, few, Collapse::edge)},
+                          {.back = {0.5, 0.2, 1}, .height = 260, .scale = 0.5}, threads);
+  return written;
 }
 
 /// The tables of core/lightfield/README.md but for a million vertices, whose memory is measured alone.
@@ -301,8 +361,12 @@ int main_of(int argc, char** argv) {
   } else if (what == "scale") {
     const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
     measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
+  } else if (what == "figures" && argc == 4) {
+    return draw_figures(argv[2], argv[3]) ? 0 : 1;
   } else {
-    return std::fprintf(stderr, "kiln_light_field all MODELS | scale VERTICES [DEGREE] [RATIO]\n"), 2;
+    return std::fprintf(stderr,
+                        "kiln_light_field all MODELS | scale VERTICES [DEGREE] [RATIO] | figures MODELS FOLDER\n"),
+           2;
   }
   return 0;
 }

@@ -18,9 +18,6 @@ LightFieldError compare(const LitMesh& truth, const LitMesh& found);
 /// meshoptimizer's WASM build with band 0 as colours; nothing where there is no node or package.
 std::optional<LitMesh> simplify_meshopt(const LitMesh&, std::size_t triangles, float weight);
 
-/// Of every vertex' function over its hemisphere.
-std::vector<Vec3d> mean_radiance(const LitMesh&);
-
 /// Extended quadrics of position and mean colour (Garland and Heckbert 1998), collapsed under the same guards as ours.
 /// The radiance functions are carried along as ours are. `weight`: of colours relative to the field's RMS, where
 /// lengths are those of the unit cube.

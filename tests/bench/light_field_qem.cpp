@@ -6,7 +6,7 @@
 
 #include "core/lightfield/collapse_mesh.h"
 #include "core/lightfield/collapse_queue.h"
-#include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/mean_radiance.h"
 #include "core/mesh/topology.h"
 #include "tests/bench/light_field_compare.h"
 
@@ -38,31 +38,10 @@ struct Quadric6 {
   }
 };
 
-}  // namespace
-
-std::vector<Vec3d> mean_radiance(const LitMesh& lit) {
-  const HemisphereNorm norm(lit.field.degree);
-  const std::size_t count = lit.field.count();
-  std::vector<Vec3d> out;
-  for (std::size_t v = 0; v < lit.mesh.position.size(); ++v) {
-    std::vector<double> columns(4 * count);
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t c = 0; c < 3; ++c) columns[4 * i + c] = lit.field.of(v)[c * count + i];
-    columns[3] = 3.5449077018110318;  // the constant 1: sqrt(4 pi) Y_0
-    norm.to_coordinates(to_double(lit.mesh.normal[v]), 4, columns.data());
-    Vec3d mean;
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t c = 0; c < 3; ++c) mean[c] += columns[4 * i + c] * columns[4 * i + 3];
-    out.push_back(mean);
-  }
-  return out;
-}
-
-namespace {
-
 /// Mean colours as parts of their RMS.
 std::vector<Vec3d> mean_colours(const LitMesh& lit) {
-  std::vector<Vec3d> out = mean_radiance(lit);
+  std::vector<Vec3d> out;
+  for (const Vec3f& colour : mean_radiance(lit.field, lit.mesh.normal)) out.push_back(to_double(colour));
   double squares = 0;
   for (const Vec3d& c : out) squares += dot(c, c);
   const double rms = std::sqrt(squares / static_cast<double>(out.size()));

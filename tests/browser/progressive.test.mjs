@@ -59,10 +59,10 @@ test('what does not fit together is said in words', () => {
   };
   assert.throws(spoilt(0, 7), /version/);
   assert.throws(spoilt(3, 1 << 30), /base is larger/);
-  assert.throws(spoilt(11, 0x7fc00000), /not finite/); // the first position
+  assert.throws(spoilt(12, 0x7fc00000), /not finite/); // the first position
   const [vertices, triangles] = new Uint32Array(file.buffer, file.byteOffset + 20, 2);
   const width = [...new ProgressiveMesh(file).columns.values()].reduce((sum, c) => sum + c.width, 0);
-  const corners = 11 + width * vertices;
+  const corners = 12 + width * vertices;
   assert.throws(spoilt(corners, vertices), /base: triangle 0/);
   const splits = corners + 4 * triangles;
   assert.throws(spoilt(splits, 0), /split 0: it brings/);
@@ -76,7 +76,7 @@ test('whatever bytes are changed, a file is read or refused in words', () => {
   let refused = 0;
   for (let i = 0; i < 400; ++i) {
     const copy = bytesOf(i % 4 < 2 ? 'progressive' : 'progressive_weights');
-    for (let k = 0; k < 3; ++k) copy[Math.floor(random() * (i % 2 ? 44 : copy.length))] = Math.floor(random() * 256);
+    for (let k = 0; k < 3; ++k) copy[Math.floor(random() * (i % 2 ? 48 : copy.length))] = Math.floor(random() * 256);
     try {
       new ProgressiveMesh(copy).goTo(1e9);
     } catch (e) {

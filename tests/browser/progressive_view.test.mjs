@@ -103,7 +103,7 @@ test('playing ends with all there is', () =>
 
 test('a mesh that is damaged is said where its numbers would stand', () => {
   const damaged = Buffer.from(file);
-  const magic = damaged.indexOf(Buffer.from([0x31, 0x4b, 0x50, 0x4d])); // little endian
+  const magic = damaged.indexOf(Buffer.from([0x32, 0x4b, 0x50, 0x4d])); // little endian
   assert.ok(magic > 0);
   damaged[magic + 4] = 9; // a degree of 9
   return startMock({ files: { 'scene.glb': damaged } }).then(async (other) => {

@@ -5,6 +5,7 @@
 
 #include "client_cli/arguments.h"
 #include "tests/client_cli/run_kiln.h"
+#include "tests/core/artifact/radiance_samples.h"
 
 namespace kiln {
 namespace {
@@ -88,6 +89,19 @@ TEST(Program, ARejectedSceneEndsWithSeven) {
 
 TEST(Program, ErrorsHaveNoColourWhereNobodyLooks) {
   EXPECT_EQ(run_kiln({"inspect", "nowhere.glb"}).err.find('\033'), std::string::npos);
+}
+
+TEST(Inspect, SaysWhatLightAFileCarries) {
+  const Folder folder;
+  const Bytes file = test::radiance_triangle(RadianceBasis::polynomials, 4, true).glb();
+  const std::string path = folder.write("captured.glb", std::string(file.begin(), file.end()));
+  const Ran text = run_kiln({"inspect", path});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_NE(text.out.find("radiance functions of degree 4 at 3 vertices (polynomial, reflected)"), std::string::npos)
+      << text.out;
+  const json facts = json::parse(run_kiln({"inspect", "--json", path}).out);
+  EXPECT_EQ(facts["light_field"]["coefficients"], 75);  // kept as harmonics
+  EXPECT_EQ(facts["radiance_functions"]["degree"], 4);
 }
 
 TEST(Compare, IsAGateWithExitCodeEight) {

@@ -214,5 +214,27 @@ TEST(CarriedRadiance, ThatNobodyAskedForOrDeclaredIsAWarning) {
   EXPECT_EQ(undeclared->field.vertices(), 0U);
 }
 
+TEST(CarriedRadiance, ThatIsDamagedAtRandomIsRefusedOrWhole) {
+  RadianceSample sample = radiance_triangle(RadianceBasis::polynomials, 2, true);
+  sample.tangent = {1, 0, 0, 1, 1, 0, 0, -1, 0, 1, 0, 1};
+  const Bytes file = sample.glb(R"("rotation":[0.5,0.5,0.5,0.5])");
+  int refused = 0;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    Random random(17, i);
+    Bytes spoilt = file;
+    for (std::uint64_t k = 0; k < 1 + i % 4; ++k)
+      spoilt[random.next() % spoilt.size()] = static_cast<std::uint8_t>(random.next());
+    const auto lit = import_lit(spoilt);
+    refused += !lit;
+    if (!lit) continue;
+    const LightField& field = lit->field;
+    EXPECT_TRUE(field.coefficients.empty() || field.vertices() == lit->scene.mesh.position.size());
+    EXPECT_EQ(field.coefficients.size() % (3 * field.count()), 0U);
+    for (const float c : field.coefficients) EXPECT_TRUE(std::isfinite(c));
+  }
+  EXPECT_GT(refused, 500);
+  EXPECT_LT(refused, 3000);
+}
+
 }  // namespace
 }  // namespace kiln

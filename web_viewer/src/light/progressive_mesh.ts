@@ -20,11 +20,12 @@ interface Header {
   turned: number;
   moved: number;
   rank: number; // of light, 0: floats
+  wide: number; // so many weights have 16 bits, the others 8
 }
 
 const kName = 'KILN_progressive_mesh';
 const kMagic = 0x4d504b32;
-const kHeader = 44; // bytes
+const kHeader = 48; // bytes
 const kSplit = 5; // words: counts, turned corners, two parents, error
 const kParents = 2;
 const kError = 4;
@@ -45,13 +46,14 @@ function fail(what: string): never {
 
 function readHeader(buffer: ArrayBuffer): Header {
   if (buffer.byteLength < kHeader || buffer.byteLength % 4 !== 0) fail('the header is not whole');
-  const [magic, degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank] = new Uint32Array(
+  const [magic, degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank, wide] = new Uint32Array(
     buffer,
     0,
     kHeader / 4,
   );
-  if (magic !== kMagic || degree > kMostDegree || has > 63 || rank > 3 * (degree + 1) ** 2) fail('the version is not known');
-  return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank };
+  if (magic !== kMagic || degree > kMostDegree || has > 63 || rank > 3 * (degree + 1) ** 2 || wide > rank)
+    fail('the version is not known');
+  return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank, wide };
 }
 
 /// Columns of vertices in the order of the file.
@@ -64,6 +66,12 @@ function columnsOf(h: Header): { name: string; width: number }[] {
   ];
 }
 
+/// Codes of vertices: of the first weights, then of the others.
+interface Codes {
+  wide: Uint16Array;
+  narrow: Uint8Array;
+}
+
 /// How light comes from codes: weight k is offset[k] + scale[k] code, and light the mean and the rows by their weights.
 interface LightForm {
   scale: Float32Array;
@@ -72,15 +80,17 @@ interface LightForm {
 }
 
 /// Sums in the order of core/lightfield/progressive_bytes.cpp, in double, rounded once: the same bits.
-function decodeLight({ scale, offset, rows }: LightForm, codes: Uint16Array, vertices: number): Float32Array {
-  const rank = scale.length;
+function decodeLight({ rank, wide }: Header, form: LightForm, codes: Codes, vertices: number): Float32Array {
+  const { scale, offset } = form;
+  const rows = Float64Array.from(form.rows);
   const width = rows.length / (rank + 1);
   const out = new Float32Array(width * vertices);
   const sum = new Float64Array(width);
   for (let v = 0; v < vertices; ++v) {
     sum.set(rows.subarray(0, width));
     for (let k = 0; k < rank; ++k) {
-      const weight = offset[k] + scale[k] * codes[rank * v + k];
+      const code = k < wide ? codes.wide[wide * v + k] : codes.narrow[(rank - wide) * v + k - wide];
+      const weight = offset[k] + scale[k] * code;
       const first = (k + 1) * width;
       for (let s = 0; s < width; ++s) sum[s] += weight * rows[first + s];
     }
@@ -118,7 +128,9 @@ export class ProgressiveMesh {
     const columns = columnsOf(h);
     const light = columns[columns.length - 1].width;
     const width = columns.reduce((sum, c) => sum + c.width, 0) - (h.rank > 0 ? light : 0);
-    const codeWords = (count: number) => Math.ceil((h.rank * count) / 2);
+    const wideWords = (count: number) => Math.ceil((h.wide * count) / 2);
+    const narrowWords = (count: number) => Math.ceil(((h.rank - h.wide) * count) / 4);
+    const codeWords = (count: number) => wideWords(count) + narrowWords(count);
     const words =
       kHeader / 4 +
       (h.rank > 0 ? 2 * h.rank + (h.rank + 1) * light : 0) +
@@ -133,10 +145,13 @@ export class ProgressiveMesh {
     let at = kHeader;
     const floats = (count: number) => new Float32Array(buffer, (at += 4 * count) - 4 * count, count);
     const integers = (count: number) => new Uint32Array(buffer, (at += 4 * count) - 4 * count, count);
-    const codes = (count: number) => new Uint16Array(buffer, (at += 4 * codeWords(count)) - 4 * codeWords(count), h.rank * count);
+    const codes = (count: number): Codes => ({
+      wide: new Uint16Array(buffer, (at += 4 * wideWords(count)) - 4 * wideWords(count), h.wide * count),
+      narrow: new Uint8Array(buffer, (at += 4 * narrowWords(count)) - 4 * narrowWords(count), (h.rank - h.wide) * count),
+    });
     const form = { scale: floats(h.rank), offset: floats(h.rank), rows: floats(h.rank > 0 ? (h.rank + 1) * light : 0) };
     const column = (c: { name: string; width: number }, count: number): Column => ({
-      values: h.rank > 0 && c.name === 'coefficients' ? decodeLight(form, codes(count), count) : floats(c.width * count),
+      values: h.rank > 0 && c.name === 'coefficients' ? decodeLight(h, form, codes(count), count) : floats(c.width * count),
       width: c.width,
     });
     this.degree = h.degree;
