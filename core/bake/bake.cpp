@@ -111,6 +111,7 @@ struct Pass {
   std::size_t rank = 0;  // of the stored components; 0: raw
   BakedScene decoded;
   std::uint64_t bounce_rays = 0;
+  std::optional<MergeOutcome> merge;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
@@ -157,7 +158,7 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   return out;
 }
 
-/// Leaves the refined surface in `scene`.
+/// Leaves the surface that is the truth in `scene`: the refined one, or where vertices were merged that of the input.
 Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional<Environment>& light, Plan plan,
                        BakeLog& log, Threads& threads) {
   Pass pass;
@@ -165,6 +166,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   Transport transport;
   std::unique_ptr<LinksStep> links;
   std::optional<OutgoingLight> outgoing;
+  std::optional<Mesh> unmerged;
+  if (plan.merge) unmerged = scene.mesh;
   if (plan.radiosity) {
     if (light) own.name = light->name;
     if (plan.links) {
@@ -183,6 +186,7 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
   const NoiseProbes noise = std::move(transport.noise);
   pass.bounce_rays = transport.bounce_rays;
+  pass.merge = transport.merge;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   std::optional<LightFieldStage> stage;
   if (outgoing) stage.emplace(baked, std::move(*outgoing), plan, log, threads);
@@ -194,6 +198,7 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   scene = stage ? stage->take_surface() : std::move(baked.scene);
+  if (unmerged) scene.mesh = std::move(*unmerged);
   baked = {};  // from here on the delivered file is what counts
   KILN_TRY(decoded, reopen(glb, scene));
   threads.check();
@@ -209,7 +214,10 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     pass.certificate = certify(
         decoded, truth, light,
         {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
-    if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
+    if (!plan.radiosity) {
+      const double merging = pass.merge ? pass.merge->error : 0;
+      pass.sources = split_error(*pass.certificate, decoded, {noise, storage, plan.tail_left, merging});
+    }
   }
   if (stage) {
     KILN_TRY(outcome, stage->finish(glb, decoded, {scene, light, input.recipe}, log, threads));
@@ -333,6 +341,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .streams = pass.streams,
                                           .rank = pass.rank,
                                           .certificate = pass.certificate,
+                                          .merge = pass.merge,
                                           .sources = pass.sources,
                                           .grid = pass.grid,
                                           .links = pass.links,

@@ -11,7 +11,7 @@ std::uint32_t append_vertex(LitMesh& to, const LitMesh& from, std::uint32_t vert
     const auto copy = b[vertex];  // `a` may be `b`
     a.push_back(copy);
   });
-  const std::size_t row = 3 * from.field.count(), at = to.field.coefficients.size();
+  const std::size_t row = from.field.row(), at = to.field.coefficients.size();
   to.field.coefficients.resize(at + row);
   std::copy_n(from.field.coefficients.begin() + static_cast<std::ptrdiff_t>(row * vertex), row,
               to.field.coefficients.begin() + static_cast<std::ptrdiff_t>(at));
@@ -34,7 +34,7 @@ void drop_unused_vertices(LitMesh& lit) {
   for (const Triangle& t : lit.mesh.triangles)
     for (const std::uint32_t v : t) to[v] = 0;
   std::uint32_t next = 0;
-  const std::size_t row = 3 * lit.field.count();
+  const std::size_t row = lit.field.row();
   for (std::uint32_t v = 0; v < to.size(); ++v) {
     if (to[v] == kUnused) continue;
     each_attribute(lit.mesh, [&](auto& array) { array[next] = array[v]; });
