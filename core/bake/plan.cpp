@@ -101,10 +101,12 @@ void plan_merging(Plan& plan, const Scene& scene, const PrtStep& step, const Eff
   if (!step.subdivide.triangles) merge.added = effort.triangles;
   const std::string reason = "within " + short_text(100 * merge.max_reach) +
                              " % of its diagonal the shape needs about " + std::to_string(shape) + " of " +
-                             std::to_string(input) + " triangles";
+                             std::to_string(input) + " triangles, and with light at least " +
+                             std::to_string(merge.triangles);
   const bool worth =
       static_cast<double>(merge.triangles) < kWorth * static_cast<double>(input) && input - merge.triangles >= kFew;
-  if (step.merge == Mode::automatic && !worth) return decide(plan, "merge", "no", "the input is coarse: " + reason);
+  if (step.merge == Mode::automatic && !worth)
+    return decide(plan, "merge", "no", "the input is coarse for what it shows: " + reason);
   plan.merge = merge;
   decide(plan, "merge", "to about " + std::to_string(merge.triangles) + " triangles",
          step.merge == Mode::on ? kAsked : reason);

@@ -7,8 +7,8 @@
 // must not exceed it either.
 // Units   max_reach is a share of the diagonal of the box of a connected piece, so a small thing in a large room keeps
 //         its shape as well as the room does
-// Error   none for the vertices of the input: each lies within its reach of the result. Vertices of the result were up to
-//         1.11 times as far from the input (its test): insides of triangles move beyond their corners
+// Error   none for the vertices of the input: each lies within its reach of the result. Vertices of the result were
+//         1.11 times as far from the input at most (its test): insides of triangles move beyond their corners
 // Cost    points of a patch x its triangles for each collapse; 20 bytes a point
 // Repeat  same bits always
 
