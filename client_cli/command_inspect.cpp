@@ -35,6 +35,12 @@ json scene_facts(const Scene& scene) {
           {"warnings", warnings}};
 }
 
+/// The radiance functions at the vertices, or null.
+json field_facts(const LightField& field) {
+  if (field.coefficients.empty()) return nullptr;
+  return {{"degree", field.degree}, {"coefficients", 3 * field.count()}, {"vertices", field.vertices()}};
+}
+
 /// The meshes of the scene that viewers show; an artefact has its geometry a second time with the original materials.
 json shown_meshes(const json& gltf) {
   json meshes = gltf.value("meshes", json::array());
@@ -120,7 +126,10 @@ json facts_of_json(std::string_view text) {
   const json gltf = json::parse(text, nullptr, false);
   if (!gltf.is_object()) return json::object();
   try {
-    return {{"attributes", attributes_of(gltf)},
+    const json none;
+    const json::json_pointer carried("/extensions/KILN_radiance_functions");
+    return {{"radiance_functions", gltf.contains(carried) ? gltf[carried] : none},
+            {"attributes", attributes_of(gltf)},
             {"draco_bytes", draco_bytes(gltf)},
             {"extensions", gltf.value("extensionsUsed", json::array())}};
   } catch (const json::exception&) {  // the readers have judged this file; facts of a strange one are just left out
@@ -135,7 +144,9 @@ Outcome<json> facts_of(const std::string& path) {
     KILN_TRY(baked, load_artefact(path));
     facts["kind"] = "artefact";
     facts["light"] = light_facts(baked);
-    facts["certificate"] = certificate_beside(path, "/certificate");
+    facts["light_field"] = field_facts(baked.field);
+    const bool lit = !baked.field.coefficients.empty();
+    facts["certificate"] = certificate_beside(path, lit ? "/lightfield/certificate" : "/certificate");
     facts.update(scene_facts(baked.scene));
     facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) /
                                 static_cast<double>(std::max<std::size_t>(1, baked.scene.mesh.position.size()));
@@ -147,9 +158,10 @@ Outcome<json> facts_of(const std::string& path) {
     facts["certificate"] = certificate_beside(path, "/grid/certificate");
     return facts;
   } else {
-    KILN_TRY(scene, load_scene(path));
+    KILN_TRY(lit, load_lit_scene(path));
     facts["kind"] = "scene";
-    facts.update(scene_facts(scene));
+    facts["light_field"] = field_facts(lit.field);
+    facts.update(scene_facts(lit.scene));
   }
   facts.update(facts_of_json(gltf_json(bytes)));
   return facts;
@@ -178,6 +190,17 @@ std::string light_lines(const json& light) {
   return out;
 }
 
+std::string field_line(const json& facts) {
+  const json field = facts.value("light_field", json());
+  if (!field.is_object()) return {};
+  const json declared = facts.value("radiance_functions", json());
+  std::string basis = "harmonics, reflected";
+  if (declared.is_object())
+    basis = declared.value("basis", "") + std::string(declared.value("reflected", false) ? ", reflected" : "");
+  return line("carries", "radiance functions of degree " + field["degree"].dump() + " at " + field["vertices"].dump() +
+                             " vertices (" + basis + "); the step lightfield simplifies them");
+}
+
 std::string grid_text(const json& facts) {
   const json& grid = facts["grid"];
   return line("grid",
@@ -198,6 +221,7 @@ std::string facts_text(const json& facts) {
                            "; " + human_bytes(facts["image_bytes"].get<double>()) + " of images");
   out += line("world size", facts["world_size"].dump());
   if (facts.contains("light")) out += light_lines(facts["light"]);
+  out += field_line(facts);
   if (facts.contains("draco_bytes") && facts["draco_bytes"] != 0)
     out += line("draco", human_bytes(facts["draco_bytes"].get<double>()));
   if (facts.contains("bytes_per_vertex")) {

@@ -163,6 +163,7 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
                                         const LookupOptions& options) {
   std::vector<LightValue> out;
   const EyeLight seen = eye_light(baked, {light.begin(), light.end()}, true);
+  const std::optional<MirroredSky> sky = mirrored_sky(baked);
   for (const auto& place : places) {
     if (!place) {
       out.push_back(no_value());
@@ -175,11 +176,14 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
     const Vec3d* view = view_of(options, out.size() - 1);
     if (!view) continue;
     const Vec3d normal = match_normal(baked.scene.mesh, *place);
+    const SurfacePoint surface = surface_at(baked.scene, *place);
     if (!baked.field.coefficients.empty()) {
-      out.back().radiance = seen_radiance(baked.field, point.triangle, place->u, place->v, normal, normalized(*view));
+      const EyeMaterial material = eye_material(baked.scene, surface);
+      out.back().radiance = seen_radiance(
+          baked.field, sky ? &*sky : nullptr,
+          {point.triangle, place->u, place->v, normal, normalized(*view), material.f0, material.roughness});
       continue;
     }
-    const SurfacePoint surface = surface_at(baked.scene, *place);
     const EyeRadiance radiance =
         eye_radiance(baked, seen, {point, normal, normalized(*view), eye_material(baked.scene, surface)});
     out.back().radiance = radiance.diffuse + radiance.specular + to_double(emission_at(baked.scene, surface));

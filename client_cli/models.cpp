@@ -52,6 +52,11 @@ Outcome<Scene> load_scene(const std::string& path) {
   return or_failure(import_scene(files));
 }
 
+Outcome<LitScene> load_lit_scene(const std::string& path) {
+  KILN_TRY(files, load_files(path));
+  return or_failure(import_lit_scene(files));
+}
+
 Outcome<BakedScene> load_artefact(const std::string& path) {
   KILN_TRY(bytes, read_file(path));
   if (kind_of(bytes) != FileKind::artefact) {
@@ -60,6 +65,7 @@ Outcome<BakedScene> load_artefact(const std::string& path) {
   }
   Result<BakedScene> baked = read_baked_glb(bytes);
   if (!baked && baked.error().where.empty()) baked.error().where = base_name(path);
+  if (baked) decode_pixels(baked->scene);
   return or_failure(std::move(baked));
 }
 

@@ -21,6 +21,8 @@ std::string_view gltf_json(std::span<const std::uint8_t> bytes);
 /// The files of a scene for import or upload.
 Outcome<SceneFiles> load_files(const std::string& path);
 Outcome<Scene> load_scene(const std::string& path);
+/// With the radiance functions that it carries.
+Outcome<LitScene> load_lit_scene(const std::string& path);
 /// Fails  not_an_artefact when the file carries no KILN_radiance_transfer
 Outcome<BakedScene> load_artefact(const std::string& path);
 Outcome<Grid> load_grid(const std::string& path);

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/lightfield/radiance_function.h"
+#include "core/sphere/sh.h"
+
 namespace kiln {
 namespace {
 
@@ -91,6 +94,31 @@ void append_vertices(const RawPart& part, const Affine& to_world, const Wanted& 
   if (wanted.tangent) append_tangents(part, to_world, sign, mesh.tangent);
 }
 
+/// `to_world` as a turn of directions, after a flip of their sign where it mirrors; it scales evenly.
+Basis<double> turn_of(const Affine& to_world) {
+  const double sign = to_world.determinant() < 0 ? -1 : 1;
+  const Vec3d x = normalized(to_world.x * sign), z = normalized(cross(x, to_world.y * sign));
+  return {x, cross(z, x), z};
+}
+
+/// The r-RFs of the vertices that append_vertices() added last.
+void append_radiance(const RawPart& part, const Affine& to_world, LitScene& lit) {
+  const Basis<double> turn = turn_of(to_world);
+  const bool mirrored = to_world.determinant() < 0;
+  const int degree = lit.field.degree;
+  const std::size_t count = lit.field.count(), first = lit.scene.mesh.normal.size() - part.position.size();
+  std::vector<double> c(count);
+  for (std::size_t at = 0; at < part.radiance.size(); at += count) {
+    std::copy_n(part.radiance.begin() + static_cast<std::ptrdiff_t>(at), count, c.begin());
+    for (int l = 1; l <= degree && mirrored; l += 2) {
+      for (int i = l * l; i < (l + 1) * (l + 1); ++i) c[static_cast<std::size_t>(i)] *= -1;
+    }
+    rotate_sh(degree + 1, turn, c.data(), c.data());
+    reflect_harmonics(degree, to_double(lit.scene.mesh.normal[first + at / (3 * count)]), c.data());
+    for (const double x : c) lit.field.coefficients.push_back(static_cast<float>(x));
+  }
+}
+
 /// In the unit cube a face needs an area whose square a float holds, and corners that rounding has not joined.
 bool vanished(const Mesh& mesh, const Triangle& t) {
   constexpr double kLeastTwiceArea = 1e-18;
@@ -115,13 +143,15 @@ std::uint64_t append_triangles(const RawPart& part, bool mirrored, std::size_t f
   return lost;
 }
 
-void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& wanted, Scene& scene,
+void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& wanted, LitScene& lit,
                    Findings& findings) {
+  Scene& scene = lit.scene;
   const auto index = static_cast<std::uint32_t>(scene.parts.size());
   std::uint64_t lost = 0;
   for (const Affine& to_world : place.instances) {
     const std::size_t first = scene.mesh.position.size();
     append_vertices(part, to_world, wanted, scene.frame, scene.mesh);
+    append_radiance(part, to_world, lit);
     lost += append_triangles(part, to_world.determinant() < 0, first, index, scene.mesh);
   }
   if (lost > 0) {
@@ -137,7 +167,8 @@ void append_placed(const RawPart& part, const PlacedPart& place, const Wanted& w
 }
 
 /// Vertices that only vanished triangles used go; order stays.
-void drop_unused_vertices(Mesh& mesh) {
+void drop_unused_vertices(LitScene& lit) {
+  Mesh& mesh = lit.scene.mesh;
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> now(mesh.position.size(), kUnused);
   for (const Triangle& t : mesh.triangles) {
@@ -155,6 +186,14 @@ void drop_unused_vertices(Mesh& mesh) {
     }
     values.resize(kept);
   };
+  std::vector<float>& rows = lit.field.coefficients;
+  const auto width = static_cast<std::ptrdiff_t>(rows.size() / now.size());
+  for (std::size_t v = 0; v < now.size() && width > 0; ++v) {
+    if (now[v] != kUnused)
+      std::copy_n(rows.begin() + static_cast<std::ptrdiff_t>(v) * width, width,
+                  rows.begin() + std::ptrdiff_t{now[v]} * width);
+  }
+  rows.resize(static_cast<std::size_t>(width) * kept);
   compact(mesh.position);
   compact(mesh.normal);
   compact(mesh.uv0);
@@ -185,36 +224,38 @@ void reserve(const std::vector<RawPart>& parts, const std::vector<PlacedPart>& p
 
 }  // namespace
 
-void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, const ImportLimits& limits,
+void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, std::uint64_t row, const ImportLimits& limits,
                          Findings& findings) {
+  const std::uint64_t bytes = mesh_bytes(vertices, triangles) + vertices * row;
   if (triangles > limits.max_triangles) {
     findings.fail("scene_too_large", "With its instances the scene has " + std::to_string(triangles) +
                                          " triangles, the limit is " + std::to_string(limits.max_triangles) + ".");
-  } else if (mesh_bytes(vertices, triangles) > limits.max_memory_bytes ||
-             vertices > std::numeric_limits<std::uint32_t>::max()) {
-    findings.fail("scene_too_large", "With its instances the scene takes " +
-                                         std::to_string(mesh_bytes(vertices, triangles) >> 20) + " MiB, the limit is " +
-                                         std::to_string(limits.max_memory_bytes >> 20) + " MiB.");
+  } else if (bytes > limits.max_memory_bytes || vertices > std::numeric_limits<std::uint32_t>::max()) {
+    findings.fail("scene_too_large", "With its instances the scene takes " + std::to_string(bytes >> 20) +
+                                         " MiB, the limit is " + std::to_string(limits.max_memory_bytes >> 20) +
+                                         " MiB.");
   }
 }
 
 void assemble(const std::vector<RawPart>& parts, const std::vector<PlacedPart>& placed, const ImportLimits& limits,
-              Scene& scene, Findings& findings) {
+              LitScene& lit, Findings& findings) {
+  Scene& scene = lit.scene;
   Wanted wanted;
-  std::uint64_t vertices = 0, triangles = 0;
+  std::uint64_t vertices = 0, triangles = 0, row = 0;
   for (const PlacedPart& place : placed) {
     vertices += parts[place.part].position.size() * place.instances.size();
     triangles += parts[place.part].triangles.size() * place.instances.size();
+    if (!parts[place.part].radiance.empty()) row = 3 * lit.field.count() * sizeof(float);
   }
-  check_expanded_size(vertices, triangles, limits, findings);
+  check_expanded_size(vertices, triangles, row, limits, findings);
   if (findings.failed()) return;
   reserve(parts, placed, wanted, scene.mesh);
   if (triangles > 0) scene.frame = frame_of(world_bounds(parts, placed, findings));
   for (std::size_t i = 0; i < placed.size() && !findings.failed(); ++i) {
     if (parts[placed[i].part].triangles.empty()) continue;
-    append_placed(parts[placed[i].part], placed[i], wanted, scene, findings);
+    append_placed(parts[placed[i].part], placed[i], wanted, lit, findings);
   }
-  drop_unused_vertices(scene.mesh);
+  drop_unused_vertices(lit);
   if (scene.mesh.triangles.empty()) findings.fail("empty_scene", "The scene has no triangle to bake.");
 }
 

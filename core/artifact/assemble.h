@@ -17,17 +17,20 @@ struct PlacedPart {
   std::vector<Affine> instances;
 };
 
-/// Sets frame, mesh and parts of the scene. Instances are expanded in order; those that mirror get their winding
-/// turned. Positions are computed in double from matrix and file value, centred, scaled, then rounded to float once.
-/// Fails with position_out_of_range, scene_too_large (says predicted and allowed bytes and triangles) and empty_scene.
-void assemble(const std::vector<RawPart>&, const std::vector<PlacedPart>&, const ImportLimits&, Scene&, Findings&);
+/// Sets frame, mesh and parts of the scene, and the r-RFs of its vertices where the parts have radiance: RFs turn with
+/// their instances, and are reflected about the normals that come out. The field's degree is given. Instances are
+/// expanded in order; those that mirror get their winding turned. Positions are computed in double from matrix and file
+/// value, centred, scaled, then rounded to float once. Fails with position_out_of_range, scene_too_large (says
+/// predicted and allowed bytes and triangles) and empty_scene.
+void assemble(const std::vector<RawPart>&, const std::vector<PlacedPart>&, const ImportLimits&, LitScene&, Findings&);
 
 /// Bytes of the finished mesh for so many vertices and triangles: an upper bound with every attribute present.
 constexpr std::uint64_t mesh_bytes(std::uint64_t vertices, std::uint64_t triangles) {
   return vertices * 72 + triangles * 16;
 }
 
-/// Fails with scene_too_large when the expanded scene passes the limits.
-void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, const ImportLimits&, Findings&);
+/// Fails with scene_too_large when the expanded scene passes the limits; `row` bytes of radiance a vertex.
+void check_expanded_size(std::uint64_t vertices, std::uint64_t triangles, std::uint64_t row, const ImportLimits&,
+                         Findings&);
 
 }  // namespace kiln

@@ -34,7 +34,7 @@ struct GeometryOptions {
   Encoding encoding;
   const StoredTransfer* transfer = nullptr;  // null leaves the coefficients out (to measure sizes)
   const StoredGlossy* glossy = nullptr;      // null: there are no matrices, or they are left out
-  const StoredTransfer* field = nullptr;     // null: there are no r-RFs, or they are left out
+  const StoredField* field = nullptr;        // null: there are no r-RFs, or they are left out
 };
 
 /// Takes one part at a time, so that no more than one part's streams are in memory. A fault ends the visit.

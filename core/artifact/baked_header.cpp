@@ -110,6 +110,36 @@ StoredForm read_form(const json& root, const Fields& extension, const Transfer& 
 
 constexpr const char* kFieldPlace = "/extensions/KILN_light_field";
 
+/// What the r-RFs leave to the sky, if they do.
+void read_sky(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+  constexpr std::uint64_t kMostLevels = 32, kMostHeight = 1024;
+  if (!extension.has("sky")) return;
+  const Fields fields = extension.object("sky"), levels = fields.object("levels"), lobes = fields.object("lobes");
+  BakedHeader::Sky sky;
+  int no_components = -1;
+  sky.form = read_form(root, fields, visibility_shape(), sky_name, no_components, findings);
+  if (!sky.form.raw())
+    return findings.fail("not_a_baked_scene", "What is seen of the sky must be raw.", fields.pointer("form"));
+  const std::string place = levels.pointer("heights");
+  const json& heights = at(root, place);
+  if (!heights.is_array() || heights.size() < 2 || heights.size() > kMostLevels)
+    return findings.fail("number_out_of_range", "There must be 2 to 32 levels.", place);
+  for (const json& height : heights) {
+    if (!height.is_number_unsigned() || height.get<std::uint64_t>() < 2 || height.get<std::uint64_t>() > kMostHeight)
+      return findings.fail("number_out_of_range", "A level must be 2 to 1024 texels high.", place);
+    sky.levels.heights.push_back(height.get<int>());
+  }
+  sky.levels.unit = levels.number("unit", 1);
+  if (!(sky.levels.unit > 0 && sky.levels.unit <= kLargest))
+    return findings.fail("number_out_of_range", "The unit must be above zero.", levels.pointer("unit"));
+  if (lobes.count("rows", 0) != kLobeRows || lobes.count("views", 0) != kLobeViews)
+    return findings.fail("slot_count_mismatch", "The table of lobes must have 16 rows of 32 views.",
+                         lobes.pointer("rows"));
+  sky.levels_view = levels.index("bufferView", 1u << 30);
+  sky.lobes_view = lobes.index("bufferView", 1u << 30);
+  out.sky = std::move(sky);
+}
+
 /// The r-RFs, if there are any.
 void read_field(const json& root, BakedHeader& out, Findings& findings) {
   if (!at(root, kFieldPlace).is_object()) return;
@@ -124,6 +154,7 @@ void read_field(const json& root, BakedHeader& out, Findings& findings) {
   out.has_field = true;
   out.field_shape = field_shape(static_cast<int>(degree));
   out.field_form = read_form(root, extension, out.field_shape, field_name, out.field_view, findings);
+  read_sky(root, extension, out, findings);
 }
 
 /// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.

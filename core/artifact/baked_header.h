@@ -2,12 +2,14 @@
 // The JSON side of a scene.glb: what the KILN_radiance_transfer and KILN_light_field extensions say.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/findings.h"
+#include "core/artifact/sky_levels.h"
 #include "core/artifact/stored_transfer.h"
 
 namespace kiln {
@@ -24,7 +26,13 @@ struct BakedHeader {
   bool has_field = false;    // r-RFs
   Transfer field_shape;      // as they are stored: order is their degree + 1
   StoredForm field_form;
-  int field_view = -1;    // checked as components_view
+  int field_view = -1;  // checked as components_view
+  struct Sky {          // that the field keeps apart
+    StoredForm form;    // of its visibility
+    PackedSky levels;   // without texels
+    int levels_view = -1, lobes_view = -1;
+  };
+  std::optional<Sky> sky;
   GlossyTransfer glossy;  // its shape; of rank 0 (and order 0) where there are no matrices
   StoredForm glossy_form;
   int glossy_view = -1, lobes_view = -1;  // checked as components_view

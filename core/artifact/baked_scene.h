@@ -8,7 +8,7 @@
 
 #include "core/artifact/import.h"
 #include "core/base/result.h"
-#include "core/lightfield/light_field.h"
+#include "core/lightfield/mirrored_sky.h"
 #include "core/prt/components.h"
 #include "core/prt/glossy_transfer.h"
 #include "core/prt/lobe_table.h"
@@ -27,8 +27,9 @@ struct BakedScene {
   Scene scene;            // final geometry and the original materials, textures and lights
   Transfer transfer;      // of scene.mesh's vertices
   GlossyTransfer glossy;  // of whole parts: all of a part's vertices have matrices, or none
-  LobeTable lobes;        // of glossy.order, where there are matrices
   LightField field;       // of scene.mesh's vertices, or of none
+  SkyLevels sky;          // of a field that keeps it apart
+  LobeTable lobes;        // of glossy.order where there are matrices, of order 1 where the field keeps a sky apart
   BakedLight light;
   float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
@@ -49,6 +50,7 @@ struct Encoding {
   int texcoord_bits = 14;
   TransferEncoding transfer;
   TransferEncoding field;  // of r-RFs, as if they were transfer vectors
+  int visibility_bits = 10;
   bool glossy = true;      // false leaves the matrices out (to measure sizes)
   double glossy_step = 0;  // weights of matrices are rounded to steps of at most this; 0: to transfer.bits
   int speed = 7;           // Draco 0 (small) .. 10 (fast); 7 is as small as 5 and writes twice as fast (measured)
@@ -61,7 +63,7 @@ Result<Bytes> write_baked_glb(const BakedScene&, const Encoding& = {});
 /// Images come encoded; decode_pixels fills in their pixels.
 /// Fails with not_a_baked_scene, unsupported_version, slot_count_mismatch, attribute_missing, draco_damaged,
 /// accessor_count_mismatch, or as import_scene does.
-Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file);
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file, const std::string& name = "scene.glb");
 
 /// Decodes the images that base colour, emission and metallic-roughness textures name. One that cannot be decoded keeps
 /// empty pixels.

@@ -68,6 +68,16 @@ void gather(RawPart& part, const std::vector<std::uint32_t>& from) {
     for (const std::uint32_t v : from) out.push_back(values[v]);
     values = std::move(out);
   };
+  if (!part.radiance.empty()) {
+    const std::size_t width = part.radiance.size() / part.position.size();
+    std::vector<float> rows;
+    rows.reserve(width * from.size());
+    for (const std::uint32_t v : from) {
+      const float* row = part.radiance.data() + width * v;
+      rows.insert(rows.end(), row, row + width);
+    }
+    part.radiance = std::move(rows);
+  }
   pick(part.position);
   pick(part.normal);
   pick(part.uv0);

@@ -20,6 +20,11 @@ void arriving_at(const GlossyTransfer& glossy, const LitComponents& lit, const T
 
 }  // namespace
 
+std::optional<MirroredSky> mirrored_sky(const BakedScene& baked) {
+  if (!baked.field.has_sky()) return {};
+  return std::optional<MirroredSky>(std::in_place, baked.sky, baked.lobes);
+}
+
 bool has_matrices(const GlossyTransfer& glossy, const Triangle& triangle) {
   return std::ranges::all_of(triangle, [&](auto v) { return glossy.find(v) != GlossyTransfer::kNoMatrix; });
 }

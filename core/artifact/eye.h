@@ -41,6 +41,9 @@ struct EyeRadiance {
 };
 EyeRadiance eye_radiance(const BakedScene&, const EyeLight&, const EyePoint&);
 
+/// The sky that a light field keeps apart, if it does. Keeps references to the scene.
+std::optional<MirroredSky> mirrored_sky(const BakedScene&);
+
 /// Whether all three corners have matrices.
 bool has_matrices(const GlossyTransfer&, const Triangle&);
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/lightfield/radiance_function.h"
 #include "core/scene/scene.h"
 
 namespace kiln::gltf {
@@ -100,6 +101,17 @@ struct ImageSource {
   int view = -1;
 };
 
+/// KILN_radiance_functions: what the attributes _RF_n of primitives are (carried.md).
+struct RadianceDeclaration {
+  std::uint64_t version = 0;  // 0: there is none
+  RadianceBasis basis = RadianceBasis::harmonics;
+  std::uint64_t degree = 0;
+  bool reflected = false;
+
+  explicit operator bool() const { return version > 0; }
+  std::size_t count() const { return radiance_count(basis, static_cast<int>(degree)); }
+};
+
 struct Document {
   std::vector<Buffer> buffers;
   std::vector<BufferView> views;
@@ -112,6 +124,7 @@ struct Document {
   std::vector<Light> lights;  // intensity as written; position and direction come from nodes
   std::vector<int> roots;     // of the default scene
   bool declares_quantization = false;
+  RadianceDeclaration radiance;
 };
 
 }  // namespace kiln::gltf

@@ -81,21 +81,22 @@ std::vector<float> floats_of(const draco::Mesh& mesh, const draco::PointAttribut
   return out;
 }
 
-void take_attribute(const AccessorSource& source, const draco::Mesh& mesh, const std::string& name, int index,
-                    RawPart& part, const Primitive& p, Findings& findings) {
-  const std::string place = part.place + "/attributes/" + name;
+/// Empty after a fault.
+std::vector<float> attribute_of(const AccessorSource& source, const draco::Mesh& mesh, const Primitive& p,
+                                const std::string& name, const std::string& place, Findings& findings) {
   const auto* attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(p.draco.attributes.at(name)));
-  const Accessor& a = accessor(source, index);
+  const Accessor& a = accessor(source, p.attribute(name.c_str()));
   if (!attribute || a.width > 4 || attribute->num_components() != static_cast<int>(a.width)) {
-    return findings.fail("draco_invalid", "The stream does not have the attribute as the accessor says.", place);
+    findings.fail("draco_invalid", "The stream does not have the attribute as the accessor says.", place);
+    return {};
   }
-  const auto values = floats_of(mesh, *attribute, a);
+  auto values = floats_of(mesh, *attribute, a);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::isfinite(values[i])) continue;
-    return findings.fail("non_finite_geometry", "A value is not finite.",
-                         place + " element " + std::to_string(i / a.width));
+    findings.fail("non_finite_geometry", "A value is not finite.", place + " element " + std::to_string(i / a.width));
+    return {};
   }
-  set_attribute(part, name, values, a.width, place, findings);
+  return values;
 }
 
 void take_triangles(const draco::Mesh& mesh, RawPart& part, Findings& findings) {
@@ -111,27 +112,47 @@ void take_triangles(const draco::Mesh& mesh, RawPart& part, Findings& findings) 
   }
 }
 
+/// Nothing after a fault.
+std::unique_ptr<draco::Mesh> decode_checked(const AccessorSource& source, const Primitive& p, const std::string& place,
+                                            Findings& findings) {
+  if (p.mode != Mode::triangles && p.mode != Mode::triangle_strip) {
+    findings.fail("draco_invalid", "Only triangles and strips can be compressed.", place);
+    return nullptr;
+  }
+  if (!header_agrees(source, p, place, findings)) return nullptr;
+  auto mesh = decode(stream_of(source, p));
+  const std::uint64_t points = accessor(source, p.attribute("POSITION")).count;
+  if (!mesh) {
+    findings.fail("draco_invalid", "The compressed data cannot be decoded.", place);
+  } else if (mesh->num_points() != points) {
+    findings.fail("draco_count_mismatch", mismatch("vertices", mesh->num_points(), points), place);
+  }
+  return findings.failed() ? nullptr : std::move(mesh);
+}
+
 }  // namespace
 
 void read_draco(const AccessorSource& source, const Primitive& p, RawPart& part, Findings& findings) {
-  const std::string place = part.place + "/extensions/KHR_draco_mesh_compression";
-  if (p.mode != Mode::triangles && p.mode != Mode::triangle_strip) {
-    return findings.fail("draco_invalid", "Only triangles and strips can be compressed.", place);
-  }
-  if (!header_agrees(source, p, place, findings)) return;
-  const auto mesh = decode(stream_of(source, p));
-  if (!mesh) return findings.fail("draco_invalid", "The compressed data cannot be decoded.", place);
-  const std::uint64_t points = accessor(source, p.attribute("POSITION")).count;
-  if (mesh->num_points() != points) {
-    return findings.fail("draco_count_mismatch", mismatch("vertices", mesh->num_points(), points), place);
-  }
+  const auto mesh = decode_checked(source, p, part.place + "/extensions/KHR_draco_mesh_compression", findings);
+  if (!mesh) return;
   take_triangles(*mesh, part, findings);
   for (const char* name : kAttributes) {
     const int index = p.attribute(name);
-    if (index >= 0 && !findings.failed() && p.draco.attributes.contains(name)) {
-      take_attribute(source, *mesh, name, index, part, p, findings);
-    }
+    if (index < 0 || findings.failed() || !p.draco.attributes.contains(name)) continue;
+    const std::string place = part.place + "/attributes/" + name;
+    const auto values = attribute_of(source, *mesh, p, name, place, findings);
+    if (!findings.failed()) set_attribute(part, name, values, accessor(source, index).width, place, findings);
   }
+}
+
+std::vector<std::vector<float>> read_draco_attributes(const AccessorSource& source, const Primitive& p,
+                                                      const std::vector<std::string>& names, const std::string& place,
+                                                      Findings& findings) {
+  std::vector<std::vector<float>> out;
+  const auto mesh = decode_checked(source, p, place + "/extensions/KHR_draco_mesh_compression", findings);
+  for (std::size_t i = 0; mesh && i < names.size() && !findings.failed(); ++i)
+    out.push_back(attribute_of(source, *mesh, p, names[i], place + "/attributes/" + names[i], findings));
+  return out;
 }
 
 }  // namespace kiln::gltf

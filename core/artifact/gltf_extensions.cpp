@@ -7,10 +7,11 @@
 namespace kiln::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 9> kHonoured{
+constexpr std::array<std::string_view, 10> kHonoured{
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization",
     "KHR_texture_transform",      "KHR_lights_punctual",     "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing", "KHR_materials_pbrSpecularGlossiness"};
+    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing", "KHR_materials_pbrSpecularGlossiness",
+    "KILN_radiance_functions"};
 
 /// Without effect on diffuse light, so not worth a word.
 constexpr std::array<std::string_view, 4> kHarmless{"KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_materials_ior",

@@ -19,7 +19,7 @@ bool parse(const std::string& text, tinygltf::Model& model) {
 }
 
 Document load(PreparedTree tree, Findings& findings) {
-  Document document{.buffers = std::move(tree.buffers), .images = std::move(tree.images)};
+  Document document{.buffers = std::move(tree.buffers), .images = std::move(tree.images), .radiance = tree.radiance};
   tinygltf::Model model;
   if (parse(tree.text, model)) {
     convert_geometry(model, document, findings);

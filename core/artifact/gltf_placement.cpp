@@ -111,6 +111,8 @@ class Walk {
  public:
   Walk(const AccessorSource& source, const ImportLimits& limits, Findings& findings)
       : source_(source), limits_(limits), findings_(findings) {
+    const RadianceDeclaration& radiance = source.document.radiance;
+    if (radiance) row_ = 3 * sizeof(float) * (radiance.degree + 1) * (radiance.degree + 1);
     for (const Mesh& mesh : source.document.meshes) sizes_.push_back(mesh_size(source.document, mesh));
   }
 
@@ -153,7 +155,7 @@ class Walk {
     const std::uint64_t count = instance_count(source_.document, node);
     vertices_ += static_cast<double>(size.vertices) * static_cast<double>(count);
     triangles_ += static_cast<double>(size.triangles) * static_cast<double>(count);
-    check_expanded_size(whole(vertices_), whole(triangles_), limits_, findings_);
+    check_expanded_size(whole(vertices_), whole(triangles_), row_, limits_, findings_);
     if (findings_.failed()) return;
     out_.meshes.push_back(
         {.node = index, .mesh = node.mesh, .instances = expand(source_, node, world, index, findings_)});
@@ -170,6 +172,7 @@ class Walk {
   Findings& findings_;
   std::vector<PrimitiveSize> sizes_;
   std::vector<Visit> stack_;
+  std::uint64_t row_ = 0;                // bytes of radiance of a vertex
   double vertices_ = 0, triangles_ = 0;  // no product of three counts overflows a double
   Placements out_;
 };

@@ -23,6 +23,11 @@ RawPart read_primitive(const AccessorSource&, const Primitive&, const std::strin
 /// accessors before anything is decoded. Fails with draco_invalid, draco_count_mismatch.
 void read_draco(const AccessorSource&, const Primitive&, RawPart&, Findings&);
 
+/// Attributes that the compressed data holds, as floats of their accessors' width. Fails as read_draco.
+std::vector<std::vector<float>> read_draco_attributes(const AccessorSource&, const Primitive&,
+                                                      const std::vector<std::string>& names, const std::string& place,
+                                                      Findings&);
+
 /// Puts `width` floats for each vertex into the attribute called `name`; others are ignored.
 /// Fails with accessor_type if the width does not fit the name.
 void set_attribute(RawPart&, const std::string& name, const std::vector<float>& values, std::uint64_t width,

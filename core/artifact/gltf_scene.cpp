@@ -8,6 +8,7 @@
 #include "core/artifact/gltf_load.h"
 #include "core/artifact/gltf_placement.h"
 #include "core/artifact/gltf_primitive.h"
+#include "core/artifact/gltf_radiance.h"
 #include "core/artifact/json_scan.h"
 
 namespace kiln::gltf {
@@ -71,6 +72,7 @@ Parts read_parts(const AccessorSource& source, const std::vector<Placement>& pla
       if (!has_surface(primitive)) warn_of_no_surface(primitive, primitive_place(m, p), findings);
       if (!has_surface(primitive) || !wanted[m]) continue;
       RawPart part = read_primitive(source, primitive, primitive_place(m, p), findings);
+      if (d.radiance && !findings.failed()) read_radiance(source, primitive, part, findings);
       if (findings.failed()) break;
       clean_part(part, MissingNormals::flat, findings);
       out.of_mesh[m].push_back(out.parts.size());
@@ -155,35 +157,45 @@ void check_lights(const std::vector<Light>& lights, Findings& findings) {
 
 }  // namespace
 
-Scene import_gltf(const GltfContainer& container, const SceneFiles& files, const ImportLimits& limits,
-                  Findings& findings) {
-  Scene scene;
+LitScene import_gltf(const GltfContainer& container, const GltfImport& in, Findings& findings) {
+  LitScene lit;
+  Scene& scene = lit.scene;
+  const ImportLimits& limits = in.limits;
+  if (findings.failed()) return lit;
   scan_json(container.json,
             {.max_bytes = limits.max_json_bytes, .max_depth = limits.max_json_depth, .max_objects = limits.max_objects},
             findings);
-  if (findings.failed()) return scene;
-  const Document document = load_document(container.json, findings);
-  if (findings.failed()) return scene;
-  const BufferBytes bytes = load_bytes(document, container, files, limits, findings);
+  if (findings.failed()) return lit;
+  Document document = load_document(container.json, findings);
+  if (findings.failed()) return lit;
+  if (document.radiance && in.radiance == Radiance::leave) {
+    warn_of_unused_radiance(findings);
+    document.radiance = {};
+  } else {
+    check_declaration(document, findings);
+  }
+  const BufferBytes bytes = load_bytes(document, container, in.files, limits, findings);
   if (!findings.failed()) check_document(document, findings);
-  if (findings.failed()) return scene;
+  if (findings.failed()) return lit;
   const AccessorSource source{document, bytes};
   Placements placements = place_nodes(source, limits, findings);
+  if (!findings.failed() && document.radiance) check_turns(placements.meshes, findings);
   if (!findings.failed()) check_unplaced(source, placements.meshes, findings);
   Parts parts = read_parts(source, placements.meshes, findings);
-  if (findings.failed()) return scene;
+  if (findings.failed()) return lit;
   scene.materials = document.materials;
   scene.textures = document.textures;
-  scene.images = load_images(document, bytes, files, limits, findings);
+  scene.images = load_images(document, bytes, in.files, limits, findings);
   if (parts.parts.empty()) findings.fail("empty_scene", why_empty(document));
   add_default_material(scene, parts.parts);
-  if (findings.failed()) return scene;
-  assemble(parts.parts, place_parts(document, parts, placements.meshes), limits, scene, findings);
-  if (findings.failed()) return scene;
+  if (findings.failed()) return lit;
+  lit.field.degree = static_cast<int>(document.radiance.degree);
+  assemble(parts.parts, place_parts(document, parts, placements.meshes), limits, lit, findings);
+  if (findings.failed()) return lit;
   scene.lights = lights_in_unit_lengths(placements.lights, scene.frame);
   check_lights(scene.lights, findings);
   warn_of_rest_pose(document, findings);
-  return scene;
+  return lit;
 }
 
 }  // namespace kiln::gltf

@@ -6,7 +6,15 @@
 
 namespace kiln::gltf {
 
+enum class Radiance { read, leave };  // the radiance functions that a file may carry
+
+struct GltfImport {
+  const SceneFiles& files;
+  const ImportLimits& limits;
+  Radiance radiance = Radiance::leave;
+};
+
 /// All stages from JSON to the unit cube. The scene is valid unless `findings` has failed.
-Scene import_gltf(const GltfContainer&, const SceneFiles&, const ImportLimits&, Findings&);
+LitScene import_gltf(const GltfContainer&, const GltfImport&, Findings&);
 
 }  // namespace kiln::gltf

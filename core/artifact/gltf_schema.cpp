@@ -49,7 +49,8 @@ constexpr std::string_view kTypes[] = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2",
                            kAlphaModes[] = {"OPAQUE", "MASK", "BLEND"},
                            kLightTypes[] = {"point", "spot", "directional"},
                            kMeshoptModes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"},
-                           kMeshoptFilters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"};
+                           kMeshoptFilters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"},
+                           kRadianceBases[] = {"sh", "polynomial"};
 
 // Buffers, views, accessors.
 
@@ -190,7 +191,12 @@ constexpr Member kLightMembers[] = {plain("name", Is::text),  required(word("typ
 constexpr Kind kLight{kLightMembers, kHeld<tinygltf::Light> + 3 * values(8)};
 constexpr Member kLightsMembers[] = {objects("lights", kLight)};
 constexpr Kind kLights{kLightsMembers};
-constexpr Member kRootExtensionMembers[] = {object("KHR_lights_punctual", kLights)};
+constexpr Member kRadianceMembers[] = {
+    required(plain("version", Is::small_whole)), required(word("basis", kRadianceBases)),
+    required(plain("degree", Is::small_whole)), required(plain("reflected", Is::flag))};
+constexpr Kind kRadiance{kRadianceMembers};
+constexpr Member kRootExtensionMembers[] = {object("KHR_lights_punctual", kLights),
+                                            object("KILN_radiance_functions", kRadiance)};
 constexpr Kind kRootExtensions{kRootExtensionMembers};
 
 constexpr Member kAssetMembers[] = {required(plain("version", Is::text))};

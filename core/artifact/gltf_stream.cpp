@@ -10,6 +10,7 @@
 #include "core/artifact/gltf_load.h"
 #include "core/artifact/gltf_placement.h"
 #include "core/artifact/gltf_primitive.h"
+#include "core/artifact/gltf_radiance.h"
 #include "core/artifact/json_scan.h"
 #include "core/artifact/triangle_stream.h"
 #include "core/scene/texture.h"
@@ -318,6 +319,7 @@ bool load(GltfFile& file, const ImportLimits& limits, Findings& findings) {
   if (!findings.failed()) check_document(file.document, findings);
   if (!findings.failed()) file.placements = place_nodes(file.source(), placed, findings).meshes;
   if (findings.failed()) return false;
+  if (file.document.radiance) warn_of_unused_radiance(findings);
   keep_base_colors(file.document, findings);
   file.look.materials = file.document.materials;
   file.look.textures = file.document.textures;

@@ -91,6 +91,18 @@ std::vector<ImageSource> take_images(Json& root, Findings& findings) {
   return out;
 }
 
+RadianceDeclaration take_radiance(Json& root) {
+  const Json* given = find(root, {"extensions", "KILN_radiance_functions"});
+  if (!given) return {};
+  const RadianceDeclaration out{
+      .version = given->at("version").get<std::uint64_t>(),
+      .basis = given->at("basis") == "sh" ? RadianceBasis::harmonics : RadianceBasis::polynomials,
+      .degree = given->at("degree").get<std::uint64_t>(),
+      .reflected = given->at("reflected").get<bool>()};
+  root["extensions"].erase("KILN_radiance_functions");
+  return out;
+}
+
 void set_aside(Json& object, const char* name) {
   object["extensions"][kSetAside][name] = object[name].get<double>();
   object.erase(name);
@@ -136,6 +148,7 @@ PreparedTree prepare_tree(std::span<const std::uint8_t> text, Findings& findings
   if (findings.failed()) return out;
   out.buffers = take_buffers(root);
   out.images = take_images(root, findings);
+  out.radiance = take_radiance(root);
   root.erase("skins");  // are not applied; that a node has one is all that matters
   set_strides_aside(root);
   set_indices_aside(root);

@@ -24,6 +24,7 @@ struct PreparedTree {
   std::string text;  // for tinygltf: no file, no bytes, nothing that it refuses or loses
   std::vector<Buffer> buffers;
   std::vector<ImageSource> images;
+  RadianceDeclaration radiance;
 };
 
 /// Reads text that has passed scan_json. Fails as check_tree and with unsupported_version, asset_version_missing,

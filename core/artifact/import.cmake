@@ -10,11 +10,11 @@ kiln_library(kiln_import
           gltf_container.cpp gltf_schema.cpp gltf_check_tree.cpp gltf_extensions.cpp gltf_tree.cpp gltf_load.cpp
           gltf_model.cpp gltf_model_geometry.cpp gltf_model_materials.cpp
           gltf_bytes.cpp gltf_meshopt.cpp gltf_check.cpp gltf_accessor.cpp gltf_primitive.cpp
-          draco_header.cpp gltf_draco.cpp gltf_placement.cpp gltf_images.cpp gltf_scene.cpp
+          draco_header.cpp gltf_draco.cpp gltf_placement.cpp gltf_images.cpp gltf_radiance.cpp gltf_scene.cpp
           image_header.cpp image_decode.cpp png_decode.cpp jpeg_decode.cpp
           clean_part.cpp assemble.cpp ply_columns.cpp ply_reader.cpp ply_scene.cpp
           triangle_stream.cpp ply_stream.cpp gltf_stream.cpp
           import_scene.cpp read_scene_files.cpp
           hdr_reader.cpp exr_reader.cpp exr_writer.cpp import_environment.cpp
-  LINKS kiln_reduce kiln_scene kiln_mesh kiln_base nlohmann_json::nlohmann_json
+  LINKS kiln_reduce kiln_lightfield kiln_scene kiln_mesh kiln_base nlohmann_json::nlohmann_json
   PRIVATE_LINKS kiln_tinygltf draco::draco meshoptimizer::meshoptimizer OpenEXR::OpenEXR PNG::PNG JPEG::JPEG)

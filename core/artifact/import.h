@@ -10,6 +10,7 @@
 
 #include "core/base/file_bytes.h"
 #include "core/base/result.h"
+#include "core/lightfield/light_field.h"
 #include "core/scene/environment.h"
 #include "core/scene/scene.h"
 
@@ -36,6 +37,13 @@ struct ImportLimits {
 
 /// Reads glTF 2.0, GLB or PLY. Every index, range and number is checked before use.
 Result<Scene> import_scene(const SceneFiles&, const ImportLimits& = {});
+
+/// A scene and the r-RFs of its mesh's vertices, where the file carries radiance functions (carried.md).
+struct LitScene {
+  Scene scene;
+  LightField field;
+};
+Result<LitScene> import_lit_scene(const SceneFiles&, const ImportLimits& = {});
 
 /// Reads Radiance .hdr or scanline .exr (RGB, not deep, not multi-part), equirectangular.
 Result<Environment> import_environment(std::span<const std::uint8_t> file, const std::string& name);

@@ -137,14 +137,14 @@ bool looks_like_ply(Span file) {
 }
 
 Scene import_ply(Span file, const ImportLimits& limits, Findings& findings) {
-  Scene scene;
+  LitScene lit;
   std::vector<RawPart> parts;
   parts.push_back(read_part(file, findings));
-  if (findings.failed()) return scene;
+  if (findings.failed()) return {};
   clean_part(parts[0], MissingNormals::smooth, findings);
-  scene.materials.push_back({.name = "default", .metallic = 0, .roughness = 1});
-  assemble(parts, {{.part = 0, .name = "ply", .instances = {Affine{}}}}, limits, scene, findings);
-  return scene;
+  lit.scene.materials.push_back({.name = "default", .metallic = 0, .roughness = 1});
+  assemble(parts, {{.part = 0, .name = "ply", .instances = {Affine{}}}}, limits, lit, findings);
+  return std::move(lit.scene);
 }
 
 }  // namespace kiln

@@ -16,8 +16,8 @@ constexpr const char* kPlace = "/extensions/KILN_progressive_mesh";
 Bytes bytes_in(std::span<const std::uint8_t> file, Findings& findings) {
   Bytes out;
   read_root_extension(file, kName, findings, [&](const Fields& extension, const gltf::BufferBytes& bytes) {
-    if (extension.count("version", 0) != 1)
-      findings.fail("unsupported_version", "Only version 1 of the extension is read.", extension.pointer("version"));
+    if (extension.count("version", 0) != 2)
+      findings.fail("unsupported_version", "Only version 2 of the extension is read.", extension.pointer("version"));
     const int view = extension.index("bufferView", 1U << 30);
     if (view < 0 || static_cast<std::size_t>(view) >= bytes.views.size())
       return findings.fail("index_out_of_range", "There is no such buffer view.", extension.pointer("bufferView"));
@@ -37,7 +37,7 @@ Result<Bytes> add_progressive(std::span<const std::uint8_t> glb, std::span<const
   auto& views = document["bufferViews"];
   views.push_back({{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", bytes.size()}});
   binary.insert(binary.end(), bytes.begin(), bytes.end());
-  document["extensions"][kName] = {{"version", 1}, {"bufferView", views.size() - 1}};
+  document["extensions"][kName] = {{"version", 2}, {"bufferView", views.size() - 1}};
   auto& used = document["extensionsUsed"];
   used.push_back(kName);
   std::sort(used.begin(), used.end());

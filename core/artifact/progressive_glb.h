@@ -1,5 +1,5 @@
 #pragma once
-// KILN_progressive_mesh in a scene.glb: {"version": 1, "bufferView": n}, whose bytes core/lightfield/README.md
+// KILN_progressive_mesh in a scene.glb: {"version": 2, "bufferView": n}, whose bytes core/lightfield/README.md
 // specifies. Beside the baked scene: a reader that does not know the extension shows the file as before.
 
 #include <span>

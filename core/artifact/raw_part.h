@@ -18,6 +18,7 @@ struct RawPart {
   std::vector<Vec2f> uv0, uv1;
   std::vector<Vec4f> color, tangent;
   std::vector<Triangle> triangles;
+  std::vector<float> radiance;  // RFs in the axes of the positions: rows like those of LightField
 };
 
 enum class MissingNormals { flat, smooth };

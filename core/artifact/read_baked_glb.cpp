@@ -27,6 +27,7 @@ struct BakedFile {
   const gltf::BufferBytes& bytes;
   const BakedHeader& header;
   const LobeTable& lobes;
+  const SkyLevels& sky;
 };
 
 std::string primitive_place(std::size_t mesh, std::size_t i) {
@@ -172,7 +173,12 @@ void read_matrices(const BakedFile& file, StreamReader& streams, std::size_t fir
   }
 }
 
-void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Transfer& field, Findings& findings) {
+/// The stored numbers of a light field.
+struct FieldNumbers {
+  Transfer series, visibility;
+};
+
+void read_part(const BakedFile& file, std::size_t i, BakedScene& out, FieldNumbers& field, Findings& findings) {
   DecodedMesh decoded = decode_part(file, i, findings);
   if (findings.failed()) return;
   Mesh& mesh = out.scene.mesh;
@@ -197,7 +203,8 @@ void read_part(const BakedFile& file, std::size_t i, BakedScene& out, Transfer& 
   const BakedHeader& h = file.header;
   read_coefficients(
       h.form, streams, [&](std::size_t k) { return stored_name(h.shape, k); }, first, vertices, out.transfer);
-  if (h.has_field) read_coefficients(h.field_form, streams, field_name, first, vertices, field);
+  if (h.has_field) read_coefficients(h.field_form, streams, field_name, first, vertices, field.series);
+  if (h.sky) read_coefficients(h.sky->form, streams, sky_name, first, vertices, field.visibility);
   if (header.glossy) read_matrices(file, streams, first, vertices, out.glossy);
   check_geometry(mesh, first, place, findings);
   out.scene.parts.push_back(part);
@@ -281,14 +288,19 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.exposure = file.header.exposure;
   out.provenance = file.header.provenance;
   out.scene.frame = read_frame(file.document, findings);
-  Transfer field = file.header.field_shape;
+  FieldNumbers field{file.header.field_shape, visibility_shape()};
   for (std::size_t i = 0; i < file.header.parts.size() && !findings.failed(); ++i)
     read_part(file, i, out, field, findings);
   if (findings.failed()) return out;
   fill_optional(out.scene.mesh);
-  out.field = {std::max(0, field.order - 1), std::move(field.coefficients)};
+  out.field = {.degree = std::max(0, field.series.order - 1),
+               .coefficients = std::move(field.series.coefficients),
+               .visibility = std::move(field.visibility.coefficients),
+               .sky = {}};
+  out.sky = file.sky;
   const auto finite = [](float c) { return std::isfinite(c); };
-  if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite)) {
+  if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite) ||
+      !std::ranges::all_of(out.field.visibility, finite)) {
     findings.fail("number_out_of_range", "A coefficient does not fit a float.");
   }
   if (!std::ranges::all_of(out.glossy.weights, [](float w) { return std::isfinite(w); }))
@@ -332,6 +344,31 @@ LobeTable read_glossy(const gltf::BufferBytes& bytes, BakedHeader& header, Findi
   return lobes;
 }
 
+/// The blurred skies of a light field, and the table of lobes that belongs to them.
+SkyLevels read_sky(const gltf::BufferBytes& bytes, BakedHeader& header, LobeTable& lobes, Findings& findings) {
+  if (!header.sky) return {};
+  if (header.glossy) {
+    findings.fail("not_a_baked_scene", "A light field with a sky has no matrices beside it.", kExtensionPlace);
+    return {};
+  }
+  const std::string place = "/extensions/KILN_light_field/sky/";
+  lobes = {1, std::vector<float>(LobeTable::size_of(1))};
+  read_floats(bytes, header.sky->lobes_view, place + "lobes/bufferView", lobes.numbers, findings);
+  PackedSky& levels = header.sky->levels;
+  std::size_t count = 0;
+  for (const int height : levels.heights)
+    count += 2 * static_cast<std::size_t>(height) * static_cast<std::size_t>(height);
+  const auto view = static_cast<std::size_t>(header.sky->levels_view);
+  if (header.sky->levels_view < 0 || view >= bytes.views.size() || bytes.views[view].size() != count * 4) {
+    findings.fail("slot_count_mismatch", "The buffer view does not hold just these texels.",
+                  place + "levels/bufferView");
+    return {};
+  }
+  levels.texels.resize(count);
+  std::memcpy(levels.texels.data(), bytes.views[view].data(), count * 4);
+  return unpack_sky(levels);
+}
+
 BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   const GltfContainer container = open_glb(file, findings);
   if (findings.failed()) return {};
@@ -347,9 +384,11 @@ BakedScene read_file(std::span<const std::uint8_t> file, Findings& findings) {
   if (findings.failed()) return {};
   read_components(bytes, header, findings);
   if (findings.failed()) return {};
-  const LobeTable lobes = read_glossy(bytes, header, findings);
+  LobeTable lobes = read_glossy(bytes, header, findings);
   if (findings.failed()) return {};
-  return read_scene({document, bytes, header, lobes}, findings);
+  const SkyLevels sky = read_sky(bytes, header, lobes, findings);
+  if (findings.failed()) return {};
+  return read_scene({document, bytes, header, lobes, sky}, findings);
 }
 
 /// Which images the bake looks at.
@@ -383,8 +422,8 @@ void decode_pixels(Scene& scene) {
   }
 }
 
-Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file) {
-  Findings findings("scene.glb");
+Result<BakedScene> read_baked_glb(std::span<const std::uint8_t> file, const std::string& name) {
+  Findings findings(name);
   BakedScene out = read_file(file, findings);
   if (findings.failed()) return tl::make_unexpected(findings.fault());
   return out;

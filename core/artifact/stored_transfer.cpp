@@ -170,9 +170,12 @@ std::vector<float> StoredGlossy::pack(std::size_t k, std::span<const std::uint32
 }
 
 StoredField::StoredField(const LightField& field, const Encoding& encoding, std::span<const std::uint32_t> vertices)
-    : shape_(field_shape(field.degree)) {
+    : shape_(field_shape(field.degree)), visibility_shape_(visibility_shape()) {
   shape_.coefficients = field.coefficients;
   numbers_.emplace(shape_, encoding.field, vertices);
+  if (!field.has_sky()) return;
+  visibility_shape_.coefficients = field.visibility;
+  visibility_.emplace(visibility_shape_, TransferEncoding{.bits = encoding.visibility_bits}, vertices);
 }
 
 }  // namespace kiln

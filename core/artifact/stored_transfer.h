@@ -25,6 +25,7 @@ inline std::string stored_name(const Transfer& shape, std::size_t k) {
   return shape.order == 0 ? "_RADIOSITY" : "_PRT_" + std::to_string(k);
 }
 inline std::string field_name(std::size_t k) { return "_SLF_" + std::to_string(k); }
+inline std::string sky_name(std::size_t k) { return "_SLF_SKY_" + std::to_string(k); }
 inline std::string glossy_name(std::size_t k) { return "_GLOSSY_" + std::to_string(k); }
 
 inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
@@ -90,20 +91,24 @@ class StoredGlossy {
   std::optional<StoredTransfer> numbers_;
 };
 
-/// r-RFs on their way into a file: stored like transfer vectors of three channels.
+/// r-RFs on their way into a file: stored like transfer vectors of three channels, and what they see of the sky like
+/// such of one.
 class StoredField {
  public:
   /// `vertices` as above.
   StoredField(const LightField&, const Encoding&, std::span<const std::uint32_t> vertices);
 
   const StoredTransfer& numbers() const { return *numbers_; }
+  /// Null where no sky is kept apart.
+  const StoredTransfer* visibility() const { return visibility_ ? &*visibility_ : nullptr; }
 
  private:
-  Transfer shape_;
-  std::optional<StoredTransfer> numbers_;
+  Transfer shape_, visibility_shape_;
+  std::optional<StoredTransfer> numbers_, visibility_;
 };
 
 /// The shape under which r-RFs of a degree are stored.
 inline Transfer field_shape(int degree) { return {degree + 1, 3, false, {}}; }
+inline Transfer visibility_shape() { return {kVisibilityOrder, 1, false, {}}; }
 
 }  // namespace kiln

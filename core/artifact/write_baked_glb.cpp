@@ -12,6 +12,7 @@
 #include "core/artifact/look.h"
 #include "core/artifact/look_json.h"
 #include "core/artifact/png.h"
+#include "core/artifact/sky_levels.h"
 #include "core/base/expects.h"
 
 namespace kiln {
@@ -43,6 +44,8 @@ void check_shape(const BakedScene& baked) {
   const LightField& field = baked.field;
   EXPECTS(field.coefficients.empty() ||
           (field.degree <= kMaxLightFieldDegree && field.vertices() == mesh.position.size()));
+  EXPECTS(!field.has_sky() || (field.visibility.size() == kVisibilityCount * mesh.position.size() &&
+                               baked.sky.size() >= 2 && baked.lobes.order == 1));
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -64,6 +67,7 @@ class Writer {
     components_ = add_components(transfer_->form());
     if (field_) field_components_ = add_components(field_->numbers().form());
     add_glossy();
+    add_sky();
     std::string text = document().dump(-1, ' ', false, json::error_handler_t::replace);
     return join_glb(std::move(text), std::move(binary_));
   }
@@ -89,7 +93,7 @@ class Writer {
 
   Result<void> add_parts() {
     return visit_part_primitives(
-        baked_, {encoding_, &*transfer_, glossy_ ? &*glossy_ : nullptr, field_ ? &field_->numbers() : nullptr},
+        baked_, {encoding_, &*transfer_, glossy_ ? &*glossy_ : nullptr, field_ ? &*field_ : nullptr},
         [this](PartPrimitive part) -> Result<void> {
           const std::size_t triangles = part.mesh.triangles.size();
           KILN_TRY(bytes, encode_draco(std::move(part.mesh), encoding_.speed));
@@ -173,6 +177,21 @@ class Writer {
     lobes_ = add_floats(baked_.lobes.numbers);
   }
 
+  /// The blurred skies that a field keeps apart, and how surfaces mirror them.
+  void add_sky() {
+    if (!field_ || !field_->visibility()) return;
+    sky_ = pack_sky(baked_.sky);
+    sky_view_ = add_view({reinterpret_cast<const std::uint8_t*>(sky_.texels.data()), sky_.texels.size() * 4});
+    lobes_ = add_floats(baked_.lobes.numbers);
+  }
+
+  json sky_extension() const {
+    json out = {{"levels", {{"heights", sky_.heights}, {"unit", sky_.unit}, {"bufferView", *sky_view_}}},
+                {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *lobes_}}}};
+    put_form(out, field_->visibility()->form(), {}, sky_name);
+    return out;
+  }
+
   std::size_t add_floats(const std::vector<float>& numbers) {
     static_assert(std::endian::native == std::endian::little);
     return add_view({reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size() * sizeof(float)});
@@ -224,6 +243,7 @@ class Writer {
         {"reflected", true}, {"degree", baked_.field.degree}};
     put_form(out, field_->numbers().form(), field_components_, field_name);
     out["units"] = "W m^-2 sr^-1";
+    if (field_->visibility()) out["sky"] = sky_extension();
     return out;
   }
 
@@ -287,7 +307,8 @@ class Writer {
   std::optional<StoredTransfer> transfer_;
   std::optional<StoredGlossy> glossy_;
   std::optional<StoredField> field_;
-  std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_;  // buffer views
+  std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_, sky_view_;  // buffer views
+  PackedSky sky_;
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();
   json baked_primitives_ = json::array(), original_primitives_ = json::array();

@@ -9,6 +9,7 @@
 #include "core/artifact/look.h"
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
+#include "core/bake/carried_light.h"
 #include "core/bake/certificate.h"
 #include "core/bake/checkpoint.h"
 #include "core/bake/compression.h"
@@ -31,25 +32,34 @@
 namespace kiln {
 namespace {
 
-Result<Scene> read_scene(const BakeInput& input) {
+Result<CarriedScene> read_scene(const BakeInput& input) {
   ImportLimits limits;
   limits.max_memory_bytes = input.recipe.limits.memory_mb << 20;
-  KILN_TRY(scene, import_scene(input.scene, limits));
-  if (input.recipe.strict && !scene.warnings.empty()) {
-    const Warning& first = scene.warnings.front();
+  CarriedScene out;
+  if (input.recipe.light_field) {
+    KILN_TRY(carried, import_carried_scene(input.scene, limits));
+    out = std::move(carried);
+  } else {
+    KILN_TRY(scene, import_scene(input.scene, limits));
+    out.scene = std::move(scene);
+  }
+  if (input.recipe.strict && !out.scene.warnings.empty()) {
+    const Warning& first = out.scene.warnings.front();
     return fault("strict_" + first.code, "strict: " + first.message, first.where);
   }
-  return scene;
+  return out;
 }
 
 std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + (1U << 20) - 1) >> 20) + " MB"; }
 
 Result<void> check_memory(const Plan& plan, const Limits& limits) {
+  const bool carried = plan.field && plan.field->carried;
   if (plan.prediction.memory_bytes <= limits.memory_mb << 20) return {};
   return fault("memory_limit",
                "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
                    " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
-                   (plan.grid        ? "lower /steps/0/resolution"
+                   (carried          ? "give the file fewer vertices"
+                    : plan.grid      ? "lower /steps/0/resolution"
                     : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
                                      : "lower /steps/0/subdivide/triangles or /steps/0/order") +
                    ", or raise the limit");
@@ -85,8 +95,10 @@ Effort effort_of(const Recipe& recipe) {
   return recipe.promise ? first_effort(recipe.promise) : effort_of(recipe.quality);
 }
 
-Plan plan_of(const Scene& scene, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
+Plan plan_of(const CarriedScene& in, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
+  const Scene& scene = in.scene;
   const Environment* sky = light ? &*light : nullptr;
+  if (in.carries_light()) return make_carried_plan(in, recipe, sky != nullptr);
   if (recipe.grid) return make_grid_plan(scene, recipe, sky, threads);
   if (recipe.transport) return make_links_plan(scene, recipe, sky, threads);
   if (recipe.light_field) return make_light_field_plan(scene, recipe, sky, threads);
@@ -158,9 +170,12 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   return out;
 }
 
-/// Leaves the surface that is the truth in `scene`: the refined one, or where vertices were merged that of the input.
-Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional<Environment>& light, Plan plan,
+/// Leaves the surface that is the truth in `in.scene`: the refined one, or where vertices were merged that of the
+/// input.
+Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::optional<Environment>& light, Plan plan,
                        BakeLog& log, Threads& threads) {
+  Scene& scene = in.scene;
+  const bool carried = in.carries_light();
   Pass pass;
   BakedLight own;
   Transport transport;
@@ -168,7 +183,10 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
   std::optional<OutgoingLight> outgoing;
   std::optional<Mesh> unmerged;
   if (plan.merge) unmerged = scene.mesh;
-  if (plan.radiosity) {
+  if (carried) {
+    transport.transfer = in.diffuse;
+    outgoing.emplace(OutgoingLight{.field = in.field});
+  } else if (plan.radiosity) {
     if (light) own.name = light->name;
     if (plan.links) {
       log.begin("links", 0.4);
@@ -208,8 +226,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     pass.links = std::move(outcome);
     streams.push_back({"links", pass.links->bytes});
   }
-  if (input.recipe.certificate) {
-    log.begin("certificate", 1.0);
+  if (input.recipe.certificate) log.begin("certificate", 1.0);
+  if (input.recipe.certificate && !carried) {
     const Tracer truth(scene, threads);
     pass.certificate = certify(
         decoded, truth, light,
@@ -220,7 +238,8 @@ Result<Pass> bake_pass(const BakeInput& input, Scene& scene, const std::optional
     }
   }
   if (stage) {
-    KILN_TRY(outcome, stage->finish(glb, decoded, {scene, light, input.recipe}, log, threads));
+    KILN_TRY(outcome,
+             stage->finish(glb, decoded, {scene, light, input.recipe, carried ? &in.field : nullptr}, log, threads));
     pass.field = std::move(outcome);
   }
   if (decoded.glossy) {
@@ -272,13 +291,14 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
 }
 
 /// A single pass where a quality was asked for; where a promise was made, passes until it is kept or cannot be.
-Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optional<Environment>& light, Plan plan,
+Result<Pass> bake_passes(const BakeInput& input, CarriedScene in, const std::optional<Environment>& light, Plan plan,
                          Passes& passes, const Checkpoints& checkpoints, BakeLog& log, Threads& threads) {
   constexpr double kFirst = 0.06, kLast = 0.97, kShare = 0.6;  // of what is left of the progress, for each pass
   if (!input.recipe.promise || plan.grid) {                    // a grid has passes of its own
     log.share(0, kLast);
-    return bake_pass(input, scene, light, std::move(plan), log, threads);
+    return bake_pass(input, in, light, std::move(plan), log, threads);
   }
+  Scene& scene = in.scene;
   const Mesh surface = scene.mesh;
   std::optional<Pass> newest;
   std::optional<Plan> next = passes.resume(parse_checkpoint(checkpoints.last), std::move(plan), scene);
@@ -288,7 +308,7 @@ Result<Pass> bake_passes(const BakeInput& input, Scene scene, const std::optiona
     const double start = log.seconds();
     const std::uint64_t rays = log.rays();
     log.share(done, done + kShare * (kLast - done));
-    KILN_TRY(pass, bake_pass(input, scene, light, *next, log, threads));
+    KILN_TRY(pass, bake_pass(input, in, light, *next, log, threads));
     passes.add(record_of(pass, log.seconds() - start, log.rays() - rays, before + log.seconds()));
     if (checkpoints.save) checkpoints.save(checkpoint_json(passes.all()));
     log.know_error(passes.all().back().relrmse);
@@ -306,23 +326,24 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   if (input.recipe.reduce) return bake_reduced(input, progress, threads, checkpoints);
   BakeLog log(progress);
   log.begin("read", 0.05);
-  KILN_TRY(scene, read_scene(input));
+  KILN_TRY(in, read_scene(input));
+  Scene& scene = in.scene;
   KILN_TRY(light, job_light(input));
   const std::uint64_t input_vertices = scene.mesh.position.size(), input_triangles = scene.mesh.triangles.size();
   threads.check();
 
   log.begin("plan", 0.06);
-  const Plan plan = plan_of(scene, input.recipe, light, threads);
+  const Plan plan = plan_of(in, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
-  if (!light && !plan.lamps) {
+  if (!light && !plan.lamps && !in.carries_light()) {
     scene.warnings.push_back(
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
   const PrtStep step = input.recipe.steps.empty() ? PrtStep{} : input.recipe.steps.front();
   Passes passes(input.recipe.promise, step, input.recipe.limits);
-  KILN_TRY(pass, bake_passes(input, std::move(scene), light, plan, passes, checkpoints, log, threads));
+  KILN_TRY(pass, bake_passes(input, std::move(in), light, plan, passes, checkpoints, log, threads));
 
   log.share(0.97, 1);
   log.begin("preview", 1.0);
@@ -366,9 +387,10 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
 
 Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   if (input.recipe.reduce) return reduce_plan_json(input);
-  KILN_TRY(scene, read_scene(input));
+  KILN_TRY(in, read_scene(input));
+  Scene& scene = in.scene;
   KILN_TRY(light, job_light(input));
-  const Plan plan = plan_of(scene, input.recipe, light, threads);
+  const Plan plan = plan_of(in, input.recipe, light, threads);
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   return plan_report_json(plan, scene, input.recipe.promise);

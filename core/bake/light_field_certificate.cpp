@@ -36,6 +36,8 @@ Eyes open_eyes(const FieldCheck& check) {
   const HiddenTest hidden = hidden_test(check.truth);
   const ClosestPoint nearest(input.mesh);
   const LobeTable lobes = make_lobe_table(1);
+  const BakedScene& decoded = check.decoded;
+  const std::optional<MirroredSky> sky = mirrored_sky(decoded);
   const std::uint64_t seed = mix64(check.seed ^ 0x6669656c64ULL);
   Eyes out;
   std::uint64_t item = 0;
@@ -54,7 +56,10 @@ Eyes open_eyes(const FieldCheck& check) {
     if (hidden({place.position, place.normal, place.position, face})) continue;
     const EyeMaterial material = eye_material(input, at);
     const EyedPoint eyed{place, to_float(view), ggx_alpha(material.roughness), material.f0};
-    out.shown.push_back(seen_radiance(check.decoded.field, mesh.triangles[s.triangle], s.u, s.v, normal, view));
+    const EyeMaterial shown = eye_material(
+        decoded.scene, surface_point(decoded.scene, s.triangle, static_cast<float>(s.u), static_cast<float>(s.v)));
+    out.shown.push_back(seen_radiance(decoded.field, sky ? &*sky : nullptr,
+                                      {mesh.triangles[s.triangle], s.u, s.v, normal, view, shown.f0, shown.roughness}));
     out.truth.push_back(eyed);
     out.below.push_back(place);
     out.reflected.push_back(material.diffuse * (1 - lobe_at(lobes, dot(there, view), material.roughness).kept()));

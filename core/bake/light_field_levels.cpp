@@ -109,7 +109,7 @@ FieldLevels make_levels(const Mesh& mesh, const Transfer& transfer, LightField f
     const FieldLevel& first = out.levels.front();
     params.triangles = plan.lods > 0 ? out.levels.back().mesh.triangles.size() : coarser(first, 64);
     params.record = true;
-    out.progressive = encode_progressive(progressive_mesh(simplify({first.mesh, first.field}, params, threads).record));
+    out.progressive = progressive_mesh(simplify({first.mesh, first.field}, params, threads).record);
   }
   return out;
 }

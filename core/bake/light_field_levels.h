@@ -2,13 +2,14 @@
 // The levels of detail of a light field: the delivered scene, simplified as far as its light allows or as the recipe
 // asks, and coarser ones that follow from it. Every level is simplified further from the one before it.
 
-#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/artifact/baked_scene.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
+#include "core/lightfield/progressive_mesh.h"
 #include "core/lightfield/simplify.h"
 
 namespace kiln {
@@ -22,8 +23,8 @@ struct FieldLevel {
 };
 
 struct FieldLevels {
-  std::vector<FieldLevel> levels;         // the first is the delivered scene
-  std::vector<std::uint8_t> progressive;  // bytes of KILN_progressive_mesh from the last level to the first, if asked
+  std::vector<FieldLevel> levels;              // the first is the delivered scene
+  std::optional<ProgressiveMesh> progressive;  // from the last level to the first, if asked
 };
 
 /// From the scene as it was baked, its transfer of order 0 and its field.

@@ -1,5 +1,5 @@
 #pragma once
-// What becomes of a baked light field: levels of detail, files, certificates.
+// What becomes of a light field, baked or carried by the input: levels of detail, files, certificates.
 // The delivered scene is simplified (light_field_levels.h); truth stays that of the surface as it was baked.
 
 #include <optional>
@@ -26,6 +26,7 @@ struct FieldLevelReport {
 };
 
 struct FieldOutcome {
+  bool carried = false;  // by the input
   int degree = 0;
   double noise = 0;  // as OutgoingLight
   std::size_t rank = 0, baked_triangles = 0, baked_vertices = 0;
@@ -48,6 +49,7 @@ class LightFieldStage {
     const Scene& surface;  // what take_surface gave
     const std::optional<Environment>& environment;
     const Recipe& recipe;
+    const LightField* carried = nullptr;  // of the surface, by the input: then this is the truth
   };
   /// Adds the progressive mesh to the file whose vertices are those of `decoded`, writes the other levels and certifies
   /// them all.
@@ -58,6 +60,7 @@ class LightFieldStage {
   Scene surface_;
   FieldLevels levels_;
   TransferEncoding encoding_;
+  Bytes progressive_;  // KILN_progressive_mesh, if asked
   FieldOutcome outcome_;
 };
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "core/artifact/stored_transfer.h"
 #include "core/bake/radiosity_step.h"
+#include "core/lightfield/polynomial_space.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -31,9 +33,15 @@ FieldEffort field_effort(Quality quality) {
   return {"the final quality", 8, 4096, 500'000, 0.005};
 }
 
-/// Adds the field to a prediction. On six models at draft, beside other work: .33 to .49 us a ray, 45 to 100 us of
+TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
+  return {mesh.position[t[0]], mesh.normal[t[0]], mesh.position[t[0]], mesh.normal[t[0]]};
+}
+
+}  // namespace
+
+/// On six models at draft, beside other work: .33 to .49 us a ray, 45 to 100 us of
 /// simplification a vertex, .09 to .6 bytes a number of what is delivered, 6 to 12 bytes of memory a number.
-void add_prediction(Plan& plan) {
+void add_field_prediction(Plan& plan) {
   constexpr double kSecondsARay = 0.4e-6, kSecondsAVertex = 7e-5, kBytesANumber = 0.2, kMemoryANumber = 12;
   const double vertices = static_cast<double>(plan.prediction.vertices);
   const double rays = vertices * 2 * plan.field->outgoing.rays;
@@ -45,9 +53,12 @@ void add_prediction(Plan& plan) {
   plan.prediction.artifact_bytes += static_cast<std::uint64_t>(numbers * kBytesANumber);
 }
 
-void decide_simplification(Plan& plan, const LightFieldStep& step, const FieldEffort& effort) {
+void decide_simplification(Plan& plan, const Recipe& recipe) {
+  const LightFieldStep& step = *recipe.light_field;
+  const FieldEffort effort = field_effort(recipe.quality);
   const LightFieldStep::Simplification& s = step.simplify;
   FieldPlan& f = *plan.field;
+  f.storage = effort.storage;
   f.lods = step.lods;
   f.progressive = step.progressive;
   if (s.off) return decide(plan, "simplify", "no", "turned off by the recipe");
@@ -66,12 +77,6 @@ void decide_simplification(Plan& plan, const LightFieldStep& step, const FieldEf
       asked ? "asked for by the recipe" : effort.reason + std::string(" merges vertices that the light does not need"));
 }
 
-TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
-  return {mesh.position[t[0]], mesh.normal[t[0]], mesh.position[t[0]], mesh.normal[t[0]]};
-}
-
-}  // namespace
-
 Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const LightFieldStep& step = *recipe.light_field;
   const FieldEffort effort = field_effort(recipe.quality);
@@ -82,7 +87,7 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   f.outgoing.degree = step.degree.value_or(effort.degree);
   f.outgoing.rays = step.rays.value_or(effort.rays);
   f.outgoing.seed = recipe.seed;
-  f.storage = effort.storage;
+  f.outgoing.sky_apart = std::getenv("KILN_NOSKY") == nullptr && sky != nullptr && f.outgoing.degree >= 2;
   const std::string asked = "asked for by the recipe";
   if (!step.surface.subdivide.triangles) {
     for (Decision& d : plan.decisions) {
@@ -90,11 +95,14 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
         d.reason = effort.reason + std::string(" adds triangles where direct light, colour or finish change");
     }
   }
+  f.basis = step.basis;
+  if (f.basis == RadianceBasis::polynomials)
+    decide(plan, "basis", "polynomial", asked + ": even in the height above the surface, kept as harmonics");
   decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
   decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
          (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
-  decide_simplification(plan, step, effort);
-  add_prediction(plan);
+  decide_simplification(plan, recipe);
+  add_field_prediction(plan);
   return plan;
 }
 
@@ -138,6 +146,8 @@ OutgoingLight bake_light_field(const IncidentLight::World& world, std::span<cons
   params.progress = [&](std::uint64_t done, std::uint64_t all) { log.advance(done, all); };
   OutgoingLight out = bake_outgoing(world, value, params, threads);
   log.count_rays(out.rays);
+  if (plan.field->basis == RadianceBasis::polynomials)
+    keep_polynomials(out.field, world.tracer.scene().mesh.normal, threads);
   return out;
 }
 

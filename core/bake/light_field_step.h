@@ -20,6 +20,11 @@ namespace kiln {
 /// The plan of `radiosity` with the light field added: decisions, seconds, memory, bytes.
 Plan make_light_field_plan(const Scene&, const Recipe&, const Environment* sky, Threads&);
 
+/// Parts of such a plan that do not ask where the light comes from: simplification, levels, storage; and what is added
+/// to a prediction for the field of its vertices.
+void decide_simplification(Plan&, const Recipe&);
+void add_field_prediction(Plan&);
+
 /// What the mesh is refined for besides light: colour, emission and finish of the surface.
 class FinishSource {
  public:

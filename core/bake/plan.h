@@ -28,8 +28,10 @@ struct Decision {
   std::string reason;
 };
 
-/// What the step `lightfield` will do beside `radiosity`.
+/// What the step `lightfield` will do beside `radiosity`, or instead where the file carries its light.
 struct FieldPlan {
+  bool carried = false;
+  RadianceBasis basis = RadianceBasis::harmonics;  // of the fit
   OutgoingBake outgoing;
   double storage = 0.01;             // relRMSE that components and rounding may add
   std::optional<Simplify> simplify;  // what the delivered scene goes through
@@ -58,7 +60,7 @@ struct Plan {
   std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
   std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
   std::optional<LinkParams> links;     // of the step `transport`; `radiosity` is there too
-  std::optional<FieldPlan> field;      // of the step `lightfield`; `radiosity` is there too
+  std::optional<FieldPlan> field;      // of the step `lightfield`; `radiosity` is there too, unless carried
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

@@ -78,6 +78,7 @@ struct Painter {
   const Tracer& tracer;
   std::vector<Vec3f> value;
   EyeLight light;
+  std::optional<MirroredSky> sky;
 
   Vec3f color(const Vec3f& eye, const Vec3f& direction, float height) const {
     const Hit hit = first_facing(tracer, eye, direction);
@@ -97,7 +98,9 @@ struct Painter {
 
   Vec3f of_field(const Hit& hit, const SurfacePoint& place, const Triangle& t, const Vec3f& direction) const {
     const Vec3d normal = normalized(to_double(place.normal)), view = normalized(to_double(-direction));
-    return to_float(seen_radiance(baked.field, t, hit.u, hit.v, normal, view));
+    const EyeMaterial material = eye_material(tracer.scene(), place);
+    return to_float(seen_radiance(baked.field, sky ? &*sky : nullptr,
+                                  {t, hit.u, hit.v, normal, view, material.f0, material.roughness}));
   }
 
   /// All that a part with matrices reflects to the camera.
@@ -231,7 +234,7 @@ Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, co
                              Threads& threads) {
   const Rays rays{frame_camera(decoded.scene.mesh, preview), preview};
   const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients),
-                        eye_light(decoded, decoded.light.coefficients, true)};
+                        eye_light(decoded, decoded.light.coefficients, true), mirrored_sky(decoded)};
   const auto color = [&](std::size_t, const Rays::Ray& ray) {
     return painter.color(rays.camera.eye, ray.direction, ray.height);
   };

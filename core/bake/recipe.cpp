@@ -183,7 +183,7 @@ LightFieldStep::Simplification read_simplification(const json& value, const std:
 
 LightFieldStep read_light_field(JsonFields& fields, const std::string& pointer, Errors& errors) {
   LightFieldStep step;
-  fields.word("basis", {"sh"});
+  if (const auto word = fields.word("basis", {"sh", "polynomial"}); word == 1) step.basis = RadianceBasis::polynomials;
   if (const auto n = fields.integer_or_auto("degree", 0, kMaxLightFieldDegree)) step.degree = static_cast<int>(*n);
   if (const auto n = fields.integer_or_auto("rays", 1, 65536)) step.rays = static_cast<int>(*n);
   if (const auto n = fields.integer_or_auto("bounces", 0, 1000)) step.surface.bounces = static_cast<int>(*n);

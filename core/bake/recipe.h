@@ -11,6 +11,7 @@
 
 #include "core/grid/grid.h"
 #include "core/lightfield/collapse_cost.h"
+#include "core/lightfield/radiance_function.h"
 #include "core/prt/subdivide.h"
 #include "core/reduce/reduce_method.h"
 
@@ -90,7 +91,8 @@ struct TransportStep {
 
 /// Radiance towards every eye at the vertices (core/lightfield/outgoing.h), under the light of one job.
 struct LightFieldStep {
-  RadiosityStep surface;      // bounces and subdivision; the rest is automatic
+  RadiosityStep surface;  // bounces and subdivision; the rest is automatic
+  RadianceBasis basis = RadianceBasis::harmonics;
   std::optional<int> degree;  // bands 0 .. degree
   std::optional<int> rays;    // of a vertex
   struct Simplification {     // auto when none of the three is given

@@ -93,7 +93,7 @@ json simplification_json(const LightFieldStep::Simplification& s) {
 
 json step_json(const LightFieldStep& step) {
   return {{"do", "lightfield"},
-          {"basis", "sh"},
+          {"basis", step.basis == RadianceBasis::harmonics ? "sh" : "polynomial"},
           {"degree", or_auto(step.degree)},
           {"rays", or_auto(step.rays)},
           {"bounces", or_auto(step.surface.bounces)},

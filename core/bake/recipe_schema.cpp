@@ -99,8 +99,8 @@ std::string recipe_schema() {
       "type": "object", "required": ["do"], "additionalProperties": false,
       "properties": {
         "do": {"enum": ["lightfield"]},
-        "basis": {"description": "spherical harmonics in world axes", "enum": ["sh"], "default": "sh"},
-        "degree": {"description": "bands 0 .. degree of radiance towards the eye; coefficients = (degree + 1)^2", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 8}, {"$ref": "#/definitions/auto"}], "default": "auto"},
+        "basis": {"description": "what is fitted: spherical harmonics, (degree + 1)^2 coefficients, or polynomials of the direction along the surface, (degree + 1)(degree + 2) / 2; files hold harmonics in world axes in either case", "enum": ["sh", "polynomial"], "default": "sh"},
+        "degree": {"description": "bands 0 .. degree of radiance towards the eye; not used where the file carries its light", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 8}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "rays": {"description": "of a vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "bounces": {"$ref": "#/definitions/gather_bounces"},
         "subdivide": {"$ref": "#/definitions/subdivide"},

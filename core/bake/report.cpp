@@ -188,6 +188,7 @@ ordered_json field_object(const FieldOutcome& f) {
                       {"certificate", field_certificate_object(level.certificate)}});
   }
   return {{"degree", f.degree},
+          {"truth", f.carried ? "the light field of the input" : "paths under the light of the job"},
           {"noise", f.noise},
           {"rank", f.rank},
           {"baked_triangles", f.baked_triangles},
@@ -240,7 +241,16 @@ ordered_json radiosity_parameters(const Plan& plan) {
           {"threshold", plan.subdivide.threshold}};
 }
 
+ordered_json field_parameters(const FieldPlan& field) {
+  ordered_json out = {{"basis", field.basis == RadianceBasis::harmonics ? "sh" : "polynomial"},
+                      {"degree", field.outgoing.degree}};
+  if (!field.carried) out["rays"] = field.outgoing.rays;
+  out["storage"] = field.storage;
+  return out;
+}
+
 ordered_json parameters_object(const Plan& plan) {
+  if (plan.field && plan.field->carried) return {{"lightfield", field_parameters(*plan.field)}};
   if (plan.radiosity) {
     ordered_json out = radiosity_parameters(plan);
     if (plan.links) {
@@ -251,11 +261,7 @@ ordered_json parameters_object(const Plan& plan) {
                       {"largest", l.oracle.largest},
                       {"sender_level", l.sender_level < 0 ? ordered_json("auto") : ordered_json(l.sender_level)}};
     }
-    if (plan.field) {
-      out["lightfield"] = {{"degree", plan.field->outgoing.degree},
-                           {"rays", plan.field->outgoing.rays},
-                           {"storage", plan.field->storage}};
-    }
+    if (plan.field) out["lightfield"] = field_parameters(*plan.field);
     if (plan.grid) out["grid"] = {{"size", plan.grid->size}, {"rays_per_vertex", plan.grid->rays}};
     return out;
   }

@@ -30,12 +30,11 @@ double product(std::span<const float> a, std::span<const float> b, std::size_t n
 std::vector<double> columns_of(const LightField& field, std::uint32_t v, std::span<const std::uint32_t> others) {
   const std::size_t count = field.count(), columns = 3 * others.size();
   std::vector<double> out(count * columns);
-  const float* own = field.of(v).data();
+  const std::vector<double> own = mean_light(field, v);
   for (std::size_t i = 0; i < others.size(); ++i) {
-    const float* other = field.of(others[i]).data();
+    const std::vector<double> other = mean_light(field, others[i]);
     for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < count; ++k)
-        out[k * columns + 3 * i + c] = static_cast<double>(other[c * count + k]) - own[c * count + k];
+      for (std::size_t k = 0; k < count; ++k) out[k * columns + 3 * i + c] = other[c * count + k] - own[c * count + k];
   }
   return out;
 }
@@ -48,13 +47,14 @@ std::vector<float> difference(std::span<const float> a, std::span<const float> b
 
 }  // namespace
 
-FieldProducts::FieldProducts(const LightField& field) : field_(field), norm_(field.degree) {
-  EXPECTS(field.degree == 0 ? field.noise < field.channels : field.channels == 3 && field.noise == 0);
+FieldProducts::FieldProducts(const LightField& field)
+    : field_(field), norm_(field.degree), euclid_(field.degree == 0 && !field.has_sky()) {
+  EXPECTS(euclid_ ? field.noise < field.channels : field.channels == 3 && field.noise == 0);
 }
 
 void FieldProducts::of_differences(std::uint32_t v, std::span<const std::uint32_t> others, const Vec3d& n,
                                    std::vector<float>& products) const {
-  if (field_.degree > 0) {
+  if (!euclid_) {
     std::vector<double> columns = columns_of(field_, v, others);
     return norm_.products(n, others.size(), columns, products);
   }
@@ -67,16 +67,20 @@ void FieldProducts::of_differences(std::uint32_t v, std::span<const std::uint32_
 }
 
 double FieldProducts::squared_norm(std::uint32_t v, const Vec3d& n) const {
+  if (!euclid_) return kiln::squared_norm(norm_, n, mean_light(field_, v));
   const auto row = field_.of(v);
-  if (field_.degree == 0) return std::max(0.0, product(row, row, field_.noise));
-  const std::vector<double> rgb(row.begin(), row.end());
-  return kiln::squared_norm(norm_, n, rgb);
+  return std::max(0.0, product(row, row, field_.noise));
 }
 
 double FieldProducts::squared_distance(std::uint32_t a, std::uint32_t b, const Vec3d& n) const {
-  if (field_.degree > 0) return kiln::squared_distance(norm_, n, field_.of(a), field_.of(b));
-  const std::vector<float> d = difference(field_.of(a), field_.of(b));
-  return std::max(0.0, product(d, d, field_.noise));
+  if (euclid_) {
+    const std::vector<float> d = difference(field_.of(a), field_.of(b));
+    return std::max(0.0, product(d, d, field_.noise));
+  }
+  std::vector<double> across = mean_light(field_, a);
+  const std::vector<double> side = mean_light(field_, b);
+  for (std::size_t i = 0; i < across.size(); ++i) across[i] -= side[i];
+  return kiln::squared_norm(norm_, n, across);
 }
 
 }  // namespace kiln

@@ -1,6 +1,6 @@
 #pragma once
 // Distances between the rows of a field, whatever it holds.
-//   of radiance functions  equations 5 and 6 (hemisphere_norm.h)
+//   of radiance functions  equations 5 and 6 (hemisphere_norm.h) of their mean light (light_field.h)
 //   of degree 0            sum over channels of a b Y_00^2, less the same over those that hold noise. For means m and
 //                          half differences h of two independent draws E[m m'] - E[h h'] is the product of what was
 //                          drawn: noise neither looks like detail nor hides it. Such a product may be below zero.
@@ -29,6 +29,7 @@ class FieldProducts {
  private:
   const LightField& field_;
   HemisphereNorm norm_;
+  bool euclid_;
 };
 
 }  // namespace kiln

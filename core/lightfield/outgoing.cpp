@@ -9,6 +9,8 @@
 #include "core/base/expects.h"
 #include "core/lightfield/hemisphere_norm.h"
 #include "core/lightfield/lobe_fits.h"
+#include "core/lightfield/mirrored_sky.h"
+#include "core/lightfield/visibility_fit.h"
 #include "core/prt/direction_sets.h"
 #include "core/prt/ray_origin.h"
 #include "core/prt/transfer_point.h"
@@ -38,9 +40,41 @@ VertexMaterial material_at(const Scene& scene, std::uint32_t vertex, std::uint32
           emission_at(scene, p), finish.roughness};
 }
 
-/// The two halves of a vertex' rays: their mean is the result, their difference the noise.
+/// What a vertex sees in one direction.
+struct Look {
+  Vec3f w, light;
+  Vec3f sky;        // the part of the light that is the sky's, or would be if nothing were in the way
+  float place = 0;  // which half of its set it belongs to, as IncidentLight::Visit says
+  bool even = false, open = false, lamp = false;
+};
+
+SkyVisibility visibility_of(std::span<const Look> looks, double share) {
+  VisibilityFit fit;
+  for (const Look& look : looks)
+    if (!look.lamp) fit.add(look.w, look.even, double{look.sky.x} + double{look.sky.y} + double{look.sky.z}, look.open);
+  SkyVisibility out = fit.fit();
+  for (float& c : out) c *= static_cast<float>(share);
+  return out;
+}
+
+/// The two halves of a vertex' rays, without what the visible sky adds: their mean is the result, their difference the
+/// noise.
 struct Halves {
   std::array<LobeSum, 2> sums;
+
+  void add(std::span<const Look> looks, const SkyVisibility* visibility, const Basis<float>& local) {
+    for (const Look& look : looks) {
+      Vec3f light = look.light;
+      if (visibility && !look.lamp)
+        light = light - look.sky * static_cast<float>(visibility_along(*visibility, to_double(look.w)));
+      if (light == Vec3f{}) continue;
+      const Vec3f l = local.to_local(look.w);
+      if (look.place < 0)
+        for (LobeSum& half : sums) half.add(l, light * 0.5F);
+      else
+        sums[look.place < 0.5F ? 0 : 1].add(l, light);
+    }
+  }
 };
 
 class Gather {
@@ -50,28 +84,35 @@ class Gather {
         sets_(0, 2 * half_of(params.rays), kSets, seed_, half_of(params.rays), Spread::half_sphere),
         light_(world, {.count = sets_.samples(), .density = kEven, .direct = true, .blurred = true}, seed_) {}
 
-  void add(const TransferPoint& point, Halves& into, std::uint64_t& rays) const {
+  /// All that a vertex sees, for one sum over the half space.
+  std::vector<Look> looks(const TransferPoint& point, std::uint64_t& rays) const {
     const Vec3f origin = ray_origin(point);
     const std::uint64_t item = point_key(point);
     const LocalFrame frame = local_frame(sets_, point.normal, seed_, item);
-    const Basis<float> local = basis_around(point.normal);
     Random random(seed_, item, 2);
     const int batches = sets_.samples() / (kBatch * kPacket);
     const float weight = static_cast<float>(1 / (kEven * sets_.samples()));
+    std::vector<Look> out;
+    out.reserve(3 * static_cast<std::size_t>(sets_.samples()));
     for (int k = 0; k < batches; ++k) {
       trace(origin, frame, k, [&](const Vec3f& w, const Hit& hit) {
-        const Vec3f light = light_.along(w, hit, random, rays).light;
-        if (light != Vec3f{}) into.sums[k < batches / 2 ? 0 : 1].add(local.to_local(w), light * weight);
+        const IncidentLight::Seen seen = light_.along(w, hit, random, rays);
+        out.push_back({.w = w,
+                       .light = seen.light * weight,
+                       .sky = light_.sky_along(w) * weight,
+                       .place = k < batches / 2 ? 0 : 0.75F,
+                       .even = true,
+                       .open = seen.met == IncidentLight::Met::sky});
       });
     }
     rays += static_cast<std::uint64_t>(sets_.samples());
-    light_.visit_lights(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place) {
-      const Vec3f l = local.to_local(w);
-      if (place < 0)
-        for (LobeSum& half : into.sums) half.add(l, light * 0.5F);
-      else
-        into.sums[place < 0.5F ? 0 : 1].add(l, light);
+    light_.visit_bright_sky(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place, bool open) {
+      out.push_back({.w = w, .light = open ? light : Vec3f{}, .sky = light, .place = place, .open = open});
     });
+    light_.visit_lamps(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place) {
+      out.push_back({.w = w, .light = light, .place = place, .lamp = true});
+    });
+    return out;
   }
 
  private:
@@ -103,23 +144,57 @@ class Gather {
   IncidentLight light_;
 };
 
+/// A vertex that keeps the sky apart.
+struct SharpVertex {
+  double share = 0, alpha = 1;
+  Vec3f f0;
+};
+
+/// The blurred skies that those vertices need, and what their visibility stands for in the mean.
+void add_sky(const Environment& sky, std::span<const SharpVertex> sharp, OutgoingLight& out, Threads& threads) {
+  double least = 1, all = 0;
+  Vec3d f0;
+  for (const SharpVertex& v : sharp) {
+    if (!(v.share > 0)) continue;
+    least = std::min(least, v.alpha);
+    f0 += to_double(v.f0) * v.share;
+    all += v.share;
+  }
+  if (!(all > 0)) {
+    out.field.visibility.clear();
+    return;
+  }
+  out.sky = blur_sky(sky, least / 2, threads);
+  const Environment& level = out.sky[std::min<std::size_t>(out.sky.size() - 1, 4)];
+  Vec3d squares;
+  for (const Vec3f& c : level.radiance) squares += to_double(c) * to_double(c);
+  squares = squares / static_cast<double>(level.radiance.size());
+  out.field.sky = to_float(f0 / all * Vec3d{std::sqrt(squares.x), std::sqrt(squares.y), std::sqrt(squares.z)});
+}
+
 }  // namespace
+
+double share_apart(double roughness, int /*degree*/) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
 
 OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const Vec3f> value, const OutgoingBake& params,
                             Threads& threads) {
   const Scene& scene = world.tracer.scene();
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
+  const bool sky_apart = params.sky_apart && world.sky != nullptr;
   const LobeFits fits(params.degree, threads);
   const HemisphereNorm norm(params.degree);
   const Gather gather(world, params);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
   const std::vector<std::uint32_t> order = morton_order_of(points);
-  OutgoingLight out{.field = {params.degree, {}}};
+  OutgoingLight out;
+  out.field.degree = params.degree;
   const std::size_t numbers = 3 * out.field.count();
   out.field.coefficients.resize(numbers * points.size());
+  if (sky_apart) out.field.visibility.resize(kVisibilityCount * points.size());
   std::vector<double> noise(points.size()), mean(points.size());
+  std::vector<SharpVertex> sharp(points.size());
   std::atomic<std::uint64_t> rays = 0, done = 0;
   threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::uint64_t own = 0;
@@ -128,14 +203,22 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
       const std::uint32_t v = order[i];
       const VertexMaterial material = material_at(scene, v, faces[v]);
       const LobeFit fit = fits.at(material.roughness);
+      const Basis<float> basis = basis_around(points[v].normal);
+      const std::vector<Look> looks = gather.looks(points[v], own);
+      SkyVisibility visibility{};
+      const double apart = sky_apart ? share_apart(material.roughness, params.degree) : 0;
+      if (apart > 0) {
+        visibility = visibility_of(looks, apart);
+        std::ranges::copy(visibility, &out.field.visibility[kVisibilityCount * v]);
+        sharp[v] = {apart, ggx_alpha(material.roughness), material.f0};
+      }
       Halves halves{{LobeSum(fit), LobeSum(fit)}};
-      gather.add(points[v], halves, own);
+      halves.add(looks, apart > 0 ? &visibility : nullptr, basis);
       // The mean of both halves, each of which stands for half of the light.
       const Vec3f below = material.below * value[v];
       const std::span<float> all = out.field.of(v);
       halves.sums[0].finish(material.f0, below, 2, all);
       halves.sums[1].finish(material.f0, below, 2, half);
-      const Basis<float> basis = basis_around(points[v].normal);
       constexpr double kWhite = 3.5449077018110318;  // 2 sqrt(pi): coefficient of a constant 1
       std::vector<double> off(numbers);
       for (std::size_t k = 0; k < numbers; ++k) {
@@ -155,6 +238,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
     if (params.progress) params.progress(done, points.size());
   });
   out.rays = rays;
+  if (sky_apart) add_sky(*world.sky, sharp, out, threads);
   double squares = 0, sum = 0;
   for (std::size_t v = 0; v < points.size(); ++v) squares += noise[v], sum += mean[v];
   const auto n = static_cast<double>(std::max<std::size_t>(1, points.size()));

@@ -15,7 +15,7 @@
 #include <span>
 
 #include "core/base/threads.h"
-#include "core/lightfield/light_field.h"
+#include "core/lightfield/mirrored_sky.h"
 #include "core/meshless/incident_light.h"
 
 namespace kiln {
@@ -24,14 +24,20 @@ struct OutgoingBake {
   int degree = 4;   // 0 .. kMaxLightFieldDegree
   int rays = 1024;  // of a vertex; rounded up to a multiple of 128
   std::uint64_t seed = 0;
+  /// Keeps the sky apart where a vertex is so smooth that the series cannot hold it (light_field.h, mirrored_sky.h).
+  bool sky_apart = false;
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // vertices
 };
 
 struct OutgoingLight {
   LightField field;  // of the tracer's mesh
+  SkyLevels sky;     // where the field keeps it apart
   double noise = 0;  // of the rays: root mean square over vertices, eyes and channels, relative to the mean
   std::uint64_t rays = 0;
 };
+
+/// How much of the sky is kept apart at a roughness, 1 to 0: by a series of this degree.
+double share_apart(double roughness, int degree);
 
 /// `value` of each vertex of the world's mesh.
 OutgoingLight bake_outgoing(const IncidentLight::World&, std::span<const Vec3f> value, const OutgoingBake&, Threads&);

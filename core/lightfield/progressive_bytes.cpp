@@ -15,18 +15,34 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the bytes are little endian");
 static_assert(sizeof(Vec3f) == 12 && sizeof(Vec2f) == 8 && sizeof(Vec4f) == 16 && sizeof(Triangle) == 12);
 
-constexpr std::uint32_t kMagic = 0x4D504B31;  // "1KPM"
-constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16;
+constexpr std::uint32_t kMagic = 0x4D504B32;  // "2KPM"
+constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16, kHasSky = 32;
 
 struct Header {
   std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
-                splits = 0, turned = 0, moved = 0;
+                splits = 0, turned = 0, moved = 0, rank = 0;
+
+  std::size_t stride() const { return 3 * static_cast<std::size_t>(sh_count(static_cast<int>(degree) + 1)); }
+  std::size_t row_floats() const { return rank == 0 ? 0 : (rank + 1) * stride(); }
 };
 
 /// Of a split, as stored: counts are vertices | triangles << 3 | pairs << 5 | moved << 7.
 struct StoredSplit {
   std::uint32_t counts = 0, turned = 0, parent[2] = {};
   float error = 0;
+};
+
+/// Light as weights of rows: weight k of a vertex is offset[k] + scale[k] code[rank vertex + k]. Arrays of codes have
+/// an even length. Empty where the rank is 0.
+struct LightCode {
+  std::vector<float> scale, offset, rows;  // rows: the mean, then one for each weight
+  std::vector<std::uint16_t> all, moved;
+};
+
+/// What the file has in another form than ProgressiveMesh.
+struct Stored {
+  std::vector<StoredSplit> splits;
+  LightCode light;
 };
 constexpr std::uint32_t kMostMoved = 0x1ffffff, kMostVertices = 6;
 
@@ -36,24 +52,95 @@ std::uint32_t attributes_of(const Mesh& m) {
 }
 
 /// Calls visit(array, elements) for every array of the file in its order.
-template <class Progressive, class Splits, class Visit>
-void each_array(Progressive& p, Splits& splits, const Header& h, const Visit& visit) {
-  const auto vertices_of = [&](auto& lit, std::size_t count) {
+template <class Progressive, class AnyStored, class Visit>
+void each_array(Progressive& p, AnyStored& stored, const Header& h, const Visit& visit) {
+  const auto vertices_of = [&](auto& lit, auto& codes, std::size_t count) {
     visit(lit.mesh.position, count);
     visit(lit.mesh.normal, count);
     if (h.has & kHasUv0) visit(lit.mesh.uv0, count);
     if (h.has & kHasUv1) visit(lit.mesh.uv1, count);
     if (h.has & kHasColor) visit(lit.mesh.color, count);
     if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
-    visit(lit.field.coefficients, 3 * count * static_cast<std::size_t>(sh_count(static_cast<int>(h.degree) + 1)));
+    if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
+    visit(lit.field.coefficients, h.rank == 0 ? count * h.stride() : 0);
+    visit(codes, (count * h.rank + 1) / 2 * 2);
   };
-  vertices_of(p.all, h.vertices);
+  visit(stored.light.scale, h.rank);
+  visit(stored.light.offset, h.rank);
+  visit(stored.light.rows, h.row_floats());
+  vertices_of(p.all, stored.light.all, h.vertices);
   visit(p.all.mesh.triangles, h.triangles);
   if (h.has & kHasPart) visit(p.all.mesh.part, h.triangles);
-  visit(splits, h.splits);
+  visit(stored.splits, h.splits);
   visit(p.turned, h.turned);
   visit(p.moved_vertex, h.moved);
-  vertices_of(p.moved, h.moved);
+  vertices_of(p.moved, stored.light.moved, h.moved);
+}
+
+/// The weights of every r-RF: how far it goes along each row from the mean.
+std::vector<double> weights_of(const LightField& field, std::span<const float> rows) {
+  const std::size_t stride = 3 * field.count(), rank = rows.size() / stride - 1;
+  std::vector<double> out;
+  out.reserve(rank * field.vertices());
+  std::vector<double> squares;
+  for (std::size_t k = 1; k <= rank; ++k) {
+    double sum = 0;
+    for (const float x : rows.subspan(k * stride, stride)) sum += double{x} * x;
+    squares.push_back(sum);
+  }
+  for (std::size_t v = 0; v < field.vertices(); ++v) {
+    const std::span<const float> c = field.of(v);
+    for (std::size_t k = 1; k <= rank; ++k) {
+      double sum = 0;
+      for (std::size_t s = 0; s < stride; ++s) sum += (double{c[s]} - rows[s]) * rows[k * stride + s];
+      out.push_back(squares[k - 1] > 0 ? sum / squares[k - 1] : 0);
+    }
+  }
+  return out;
+}
+
+LightCode encode_light(const ProgressiveMesh& p, std::span<const float> rows, std::size_t rank) {
+  LightCode out{.rows = {rows.begin(), rows.end()}};
+  const std::vector<double> all = weights_of(p.all.field, rows), moved = weights_of(p.moved.field, rows);
+  constexpr double kSteps = 65535;
+  for (std::size_t k = 0; k < rank; ++k) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const auto* weights : {&all, &moved}) {
+      for (std::size_t i = k; i < weights->size(); i += rank)
+        low = std::min(low, (*weights)[i]), high = std::max(high, (*weights)[i]);
+    }
+    out.offset.push_back(static_cast<float>(low));
+    out.scale.push_back(static_cast<float>((high - low) / kSteps));
+  }
+  const auto encode = [&](const std::vector<double>& weights) {
+    std::vector<std::uint16_t> codes;
+    codes.reserve(weights.size() + 1);
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double scale = out.scale[i % rank], steps = scale > 0 ? (weights[i] - out.offset[i % rank]) / scale : 0;
+      codes.push_back(static_cast<std::uint16_t>(std::lround(std::clamp(steps, 0.0, kSteps))));
+    }
+    if (codes.size() % 2 != 0) codes.push_back(0);
+    return codes;
+  };
+  out.all = encode(all), out.moved = encode(moved);
+  return out;
+}
+
+/// Sums in this order, in double, rounded once: the viewer does the same.
+void decode_light(const LightCode& light, const std::vector<std::uint16_t>& codes, std::size_t vertices,
+                  LightField& field) {
+  const std::size_t stride = 3 * field.count(), rank = light.scale.size();
+  field.coefficients.resize(stride * vertices);
+  std::vector<double> sum(stride);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    std::copy_n(light.rows.begin(), stride, sum.begin());
+    for (std::size_t k = 0; k < rank; ++k) {
+      const double weight = double{light.offset[k]} + double{light.scale[k]} * codes[rank * v + k];
+      const float* row = light.rows.data() + (k + 1) * stride;
+      for (std::size_t s = 0; s < stride; ++s) sum[s] += weight * row[s];
+    }
+    std::ranges::transform(sum, field.of(v).begin(), [](double x) { return static_cast<float>(x); });
+  }
 }
 
 tl::unexpected<Fault> bad_index(const std::string& what, const std::string& where) {
@@ -68,7 +155,7 @@ bool all_finite(const LitMesh& lit) {
     finite = finite && std::all_of(first, first + count, [](float x) { return std::isfinite(x); });
   };
   each_attribute(lit.mesh, check);
-  check(lit.field.coefficients);
+  each_field_array(lit.field, [&](const auto& array, std::size_t) { check(array); });
   return finite;
 }
 
@@ -128,10 +215,10 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
+std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span<const float> rows) {
   const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
-           .has = attributes_of(p.all.mesh),
+           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0),
            .base_vertices = p.base_vertices,
            .base_triangles = p.base_triangles,
            .vertices = size(p.all.mesh.position),
@@ -139,11 +226,16 @@ std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
            .splits = size(p.splits),
            .turned = size(p.turned),
            .moved = size(p.moved.mesh.position)};
-  std::vector<StoredSplit> splits;
-  splits.reserve(p.splits.size());
+  Stored stored;
+  if (!rows.empty()) {
+    EXPECTS(rows.size() % h.stride() == 0);
+    h.rank = static_cast<std::uint32_t>(rows.size() / h.stride() - 1);
+  }
+  if (h.rank > 0) stored.light = encode_light(p, rows, h.rank);
+  stored.splits.reserve(p.splits.size());
   for (const VertexSplit& s : p.splits) {
     EXPECTS(s.moved <= kMostMoved);
-    splits.push_back(
+    stored.splits.push_back(
         {s.vertices | s.triangles << 3 | s.pairs << 5 | s.moved << 7, s.turned, {s.parent[0], s.parent[1]}, s.error});
   }
   std::vector<std::uint8_t> out;
@@ -152,9 +244,9 @@ std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p) {
     out.insert(out.end(), first, first + bytes);
   };
   put(&h, sizeof h);
-  each_array(p, splits, h, [&](const auto& array, std::size_t count) {
-    EXPECTS(array.size() == count);
-    put(array.data(), array.size() * sizeof array[0]);
+  each_array(p, stored, h, [&](const auto& array, std::size_t count) {
+    EXPECTS(array.size() >= count);  // more: light that is stored as codes
+    put(array.data(), count * sizeof array[0]);
   });
   return out;
 }
@@ -163,27 +255,28 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   Header h;
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
-  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 31)
+  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 31 ||
+      h.rank > h.stride())
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
     return fault("slot_count_mismatch", "The base is larger than the whole.", "header");
   ProgressiveMesh p;
   p.base_vertices = h.base_vertices, p.base_triangles = h.base_triangles;
   p.all.field.degree = p.moved.field.degree = static_cast<int>(h.degree);
-  std::vector<StoredSplit> splits;
+  Stored stored;
   std::uint64_t size = sizeof h;  // counts are 32 bits, elements below a kilobyte: no overflow
-  each_array(p, splits, h, [&](const auto& array, std::size_t count) { size += count * sizeof array[0]; });
+  each_array(p, stored, h, [&](const auto& array, std::size_t count) { size += count * sizeof array[0]; });
   if (size != bytes.size())
     return fault("truncated",
                  "There are " + std::to_string(bytes.size()) + " bytes and not " + std::to_string(size) + ".",
                  "header");
   std::size_t at = sizeof h;
-  each_array(p, splits, h, [&](auto& array, std::size_t count) {
+  each_array(p, stored, h, [&](auto& array, std::size_t count) {
     array.resize(count);
     if (count > 0) std::memcpy(array.data(), bytes.data() + at, count * sizeof array[0]);
     at += count * sizeof array[0];
   });
-  for (const StoredSplit& s : splits)
+  for (const StoredSplit& s : stored.splits)
     p.splits.push_back({.vertices = s.counts & 7,
                         .triangles = s.counts >> 3 & 3,
                         .pairs = s.counts >> 5 & 3,
@@ -191,6 +284,10 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
                         .moved = s.counts >> 7,
                         .turned = s.turned,
                         .error = s.error});
+  if (h.rank > 0) {
+    decode_light(stored.light, stored.light.all, h.vertices, p.all.field);
+    decode_light(stored.light, stored.light.moved, h.moved, p.moved.field);
+  }
   if (!all_finite(p.all)) return fault("number_out_of_range", "A vertex has a number that is not finite.", "vertices");
   if (!all_finite(p.moved)) return fault("number_out_of_range", "A row has a number that is not finite.", "moved rows");
   KILN_TRY(fine, check_splits(p));

@@ -43,13 +43,14 @@ Order order_of(const CollapseRecord& record) {
 }
 
 LitMesh empty_like(const LitMesh& lit) {
-  return {.mesh = {}, .field = {.degree = lit.field.degree, .coefficients = {}}};
+  return {.mesh = {}, .field = {.degree = lit.field.degree, .coefficients = {}, .visibility = {}, .sky = {}}};
 }
 
 void set_vertex(LitMesh& to, std::uint32_t vertex, const LitMesh& from, std::uint32_t row) {
   each_attribute_of(to.mesh, from.mesh, [&](auto& a, const auto& b) { a[vertex] = b[row]; });
-  const auto source = from.field.of(row);
-  std::ranges::copy(source, to.field.of(vertex).begin());
+  each_field_array_of(to.field, from.field, [&](auto& a, const auto& b, std::size_t numbers) {
+    std::copy_n(&b[numbers * row], numbers, &a[numbers * vertex]);
+  });
 }
 
 }  // namespace
@@ -104,7 +105,7 @@ LitMesh at_level(const ProgressiveMesh& p, std::size_t splits) {
     vertices += split.vertices, triangles += split.triangles;
   }
   each_attribute(out.mesh, [&](auto& array) { array.resize(vertices); });
-  out.field.coefficients.resize(3 * out.field.count() * vertices);
+  each_field_array(out.field, [&](auto& array, std::size_t numbers) { array.resize(numbers * vertices); });
   out.mesh.triangles.resize(triangles);
   if (!out.mesh.part.empty()) out.mesh.part.resize(triangles);
   return out;

@@ -49,8 +49,10 @@ float level_error(const ProgressiveMesh&, std::size_t splits);
 /// The finest level of at most so many triangles; 0 where there is none.
 std::size_t level_of_triangles(const ProgressiveMesh&, std::size_t triangles);
 
-/// The bytes of KILN_progressive_mesh, which README.md specifies.
-std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh&);
+/// The bytes of KILN_progressive_mesh, which README.md specifies. `rows`: a mean r-RF and what a weight of 1 adds to it,
+/// each 3 count() numbers, at right angles to each other (core/prt/components.h); then light is weights of 16 bits, each
+/// over its own range. None: float32. All else is as it was, bit by bit.
+std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh&, std::span<const float> rows = {});
 
 /// Reads untrusted bytes; every count, index and number is checked. Fails with unsupported_version, truncated,
 /// slot_count_mismatch, index_out_of_range or number_out_of_range, and a place like "split 17".

@@ -54,14 +54,18 @@ Vec3d evaluate(const RadianceFunction& f, const Vec3d& w) {
   return out;
 }
 
+void reflect_harmonics(int degree, const Vec3d& normal, double* coefficients) {
+  // R_n is half a turn about n: its own inverse, a symmetric matrix.
+  const Basis<double> turn{reflect_direction(normal, {1, 0, 0}), reflect_direction(normal, {0, 1, 0}),
+                           reflect_direction(normal, {0, 0, 1})};
+  rotate_sh(degree + 1, turn, coefficients, coefficients);
+}
+
 RadianceFunction reflected(const RadianceFunction& f) {
   RadianceFunction out = f;
-  // R_n is half a turn about n: its own inverse, a symmetric matrix.
-  const Basis<double> turn{reflect_direction(f.normal, {1, 0, 0}), reflect_direction(f.normal, {0, 1, 0}),
-                           reflect_direction(f.normal, {0, 0, 1})};
   each_channel(out, [&](double* c) {
     if (f.basis == RadianceBasis::harmonics) {
-      rotate_sh(f.degree + 1, turn, c, c);
+      reflect_harmonics(f.degree, f.normal, c);
     } else {
       reflect_polynomials(f.degree, c);
     }

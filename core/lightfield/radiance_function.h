@@ -40,6 +40,9 @@ Vec3d at_or_above_horizon(const Vec3d& normal, const Vec3d& w);
 
 Vec3d reflect_direction(const Vec3d& normal, const Vec3d& w);
 
+/// RF to r-RF and back, of one channel in harmonics of world axes.
+void reflect_harmonics(int degree, const Vec3d& normal, double* coefficients);
+
 /// RF to r-RF and back. Exact for polynomials, within rounding for harmonics.
 RadianceFunction reflected(const RadianceFunction&);
 

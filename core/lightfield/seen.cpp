@@ -5,21 +5,26 @@
 
 namespace kiln {
 
-Vec3d seen_radiance(const LightField& field, const Triangle& triangle, double u, double v, const Vec3d& normal,
-                    const Vec3d& view) {
-  const double above = dot(normal, view);
-  const Vec3d seen = above >= 0 ? view : normalized(view - normal * above, normal);
+Vec3d seen_radiance(const LightField& field, const MirroredSky* sky, const FieldPoint& at) {
+  const Vec3d& normal = at.normal;
+  const double above = dot(normal, at.view);
+  const Vec3d seen = above >= 0 ? at.view : normalized(at.view - normal * above, normal);
   std::array<double, sh_count(kMaxLightFieldDegree + 1)> y{};
   evaluate_sh(field.degree + 1, normal * (2 * std::max(0.0, above)) - seen, y.data());
-  const std::array<double, 3> weight{1 - u - v, u, v};
+  const std::array<double, 3> weight{1 - at.u - at.v, at.u, at.v};
   Vec3d out;
+  SkyVisibility visibility{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const std::span<const float> c = field.of(triangle[k]);
+    const std::span<const float> c = field.of(at.triangle[k]);
     for (std::size_t i = 0; i < field.count(); ++i) {
       const double w = weight[k] * y[i];
       out += Vec3d{c[i], c[field.count() + i], c[2 * field.count() + i]} * w;
     }
+    if (!field.has_sky()) continue;
+    const float* own = &field.visibility[kVisibilityCount * at.triangle[k]];
+    for (std::size_t i = 0; i < kVisibilityCount; ++i) visibility[i] += static_cast<float>(weight[k]) * own[i];
   }
+  if (sky != nullptr) out += sky->seen({normal, at.f0, at.roughness}, visibility, seen);
   return {std::max(0.0, out.x), std::max(0.0, out.y), std::max(0.0, out.z)};
 }
 

@@ -25,7 +25,9 @@ class Simplifier {
         cost_(mesh_, params.geometry_weight, params.collapse, params.mean_square),
         reach_(mesh_, params.max_reach),
         age_(mesh_.points(), 0) {
-    if (params.record) out_.record.before = {.mesh = {}, .field = {.degree = lit_.field.degree, .coefficients = {}}};
+    if (params.record)
+      out_.record.before = {.mesh = {},
+                            .field = {.degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}}};
   }
 
   SimplifyResult run() {

@@ -46,31 +46,13 @@ void IncidentLight::draw_bright_rays() {
 /// The sky as rays see it, at a resolution of one texel for each.
 Environment IncidentLight::blurred_sky() const {
   constexpr int kFinest = 512;
-  Environment out{.name = {}, .width = 0, .height = 0, .radiance = {}};
   const double texels = 4 * std::numbers::pi * own_.density * own_.count;
-  out.height = std::clamp(static_cast<int>(std::lround(std::sqrt(texels / 2))), 4, kFinest);
-  out.width = 2 * out.height;
-  const int parts = std::max(2, kFinest / out.height);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      Vec3d sum;
-      double all = 0;
-      for (int i = 0; i < parts * parts; ++i) {
-        const int row = i / parts, column = i % parts;
-        const double v = (y + (row + 0.5) / parts) / out.height, u = (x + (column + 0.5) / parts) / out.width;
-        const double up = std::numbers::pi * (0.5 - v), around = 2 * std::numbers::pi * (u - 0.5);
-        const Vec3d w{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)};
-        sum += to_double(balanced_sky(to_float(w))) * std::cos(up);
-        all += std::cos(up);
-      }
-      out.radiance.push_back(to_float(sum / all));
-    }
-  }
-  return out;
+  const int height = std::clamp(static_cast<int>(std::lround(std::sqrt(texels / 2))), 4, kFinest);
+  return averaged_sky(height, std::max(2, kFinest / height), [this](const Vec3f& w) { return balanced_sky(w); });
 }
 
 IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
-  if (!hit) return {own_.direct ? seen_sky(w) : Vec3f{}, Met::sky};
+  if (!hit) return {sky_along(w), Met::sky};
   if (world_.faces.side(hit.triangle, w) == HitSide::dark) return {{}, Met::back};
   LitSurface::Reflected from{.light = {}, .known = true};
   if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, random, rays);
@@ -79,9 +61,15 @@ IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random&
 
 void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                  const Visit& visit) const {
+  visit_lamps(place, item, rays, visit);
+  visit_bright_sky(place, item, rays, [&](const Vec3f& w, const Vec3f& light, float at, bool seen) {
+    if (seen) visit(w, light, at);
+  });
+}
+
+void IncidentLight::visit_lamps(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit& visit) const {
   if (!own_.direct) return;
   visit_punctual(place, rays, visit);
-  visit_bright_sky(place, item, rays, visit);
   visit_emitters(place, item, rays, visit);
 }
 
@@ -90,8 +78,8 @@ Vec3f IncidentLight::balanced_sky(const Vec3f& w) const {
   return environment_radiance(*world_.sky, w) * static_cast<float>(balance);
 }
 
-Vec3f IncidentLight::seen_sky(const Vec3f& w) const {
-  if (world_.sky == nullptr) return {};
+Vec3f IncidentLight::sky_along(const Vec3f& w) const {
+  if (world_.sky == nullptr || !own_.direct) return {};
   return blurred_ ? environment_radiance(*blurred_, w) : balanced_sky(w);
 }
 
@@ -116,7 +104,7 @@ void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, cons
 }
 
 void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
-                                     const Visit& visit) const {
+                                     const SkyVisit& visit) const {
   if (!bright_) return;
   const auto count = static_cast<std::size_t>(own_.count);
   const BrightRay* set = &bright_rays_[count * (mix64(seed_ ^ mix64(item ^ 0x736b79ULL)) % kBrightSets)];
@@ -131,7 +119,7 @@ void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std
     const std::uint32_t hidden = world_.tracer.occluded16(packet, static_cast<int>(n));
     for (std::size_t i = 0; i < n; ++i) {
       const BrightRay& ray = set[first + i];
-      if ((hidden >> i & 1U) == 0) visit(ray.w, ray.light, ray.place);
+      visit(ray.w, ray.light, ray.place, (hidden >> i & 1U) == 0);
     }
   }
   rays += count;

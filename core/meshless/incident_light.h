@@ -50,11 +50,18 @@ class IncidentLight {
   /// What one of the caller's rays brings. Adds the rays of paths to `rays`.
   Seen along(const Vec3f& w, const Hit&, Random&, std::uint64_t& rays) const;
 
+  /// The sky as rays see it where nothing is in their way.
+  Vec3f sky_along(const Vec3f& w) const;
+
   /// `place`: how far in its set the sample is, from 0 to 1, of which each half is a set as well; -1 of exact light.
   using Visit = std::function<void(const Vec3f& w, const Vec3f& light, float place)>;
   /// Visits the lamps' and the bright sky's light at a place, `item` of which names its random numbers. Nothing
   /// without `direct`. Adds to `rays`.
   void visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+  /// The same in two parts, where that of the sky is visited whether it is seen or not.
+  void visit_lamps(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+  using SkyVisit = std::function<void(const Vec3f& w, const Vec3f& light, float place, bool seen)>;
+  void visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const SkyVisit&) const;
 
  private:
   /// A sample of the sky's bright part, and what it brings where nothing is in its way.
@@ -65,10 +72,8 @@ class IncidentLight {
   Vec3f balanced_sky(const Vec3f& w) const;
   Environment blurred_sky() const;
   void draw_bright_rays();
-  Vec3f seen_sky(const Vec3f& w) const;
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
   void visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit&) const;
-  void visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
   void visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
 
   float place_of(int sample) const { return static_cast<float>(sample) / static_cast<float>(own_.count); }

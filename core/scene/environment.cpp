@@ -44,4 +44,24 @@ Vec3f environment_radiance(const Environment& e, const Vec3f& w) {
   return bilinear(e, u * e.width - 0.5, v * e.height - 0.5) * e.intensity;
 }
 
+Environment averaged_sky(int height, int parts, const std::function<Vec3f(const Vec3f&)>& radiance) {
+  Environment out{.name = {}, .width = 2 * height, .height = height, .radiance = {}};
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      Vec3d sum;
+      double all = 0;
+      for (int i = 0; i < parts * parts; ++i) {
+        const int row = i / parts, column = i % parts;
+        const double v = (y + (row + 0.5) / parts) / out.height, u = (x + (column + 0.5) / parts) / out.width;
+        const double up = kPi * (0.5 - v), around = 2 * kPi * (u - 0.5);
+        const Vec3d w{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)};
+        sum += to_double(radiance(to_float(w))) * std::cos(up);
+        all += std::cos(up);
+      }
+      out.radiance.push_back(to_float(sum / all));
+    }
+  }
+  return out;
+}
+
 }  // namespace kiln

@@ -1,6 +1,7 @@
 #pragma once
 // Distant light. One type for a constant sky, a formula and an equirectangular map.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct Environment {
 
 /// Radiance that arrives from the unit direction `w` (pointing away from the scene).
 Vec3f environment_radiance(const Environment&, const Vec3f& w);
+
+/// A map of 2 height x height texels, each the mean of `radiance` over its directions (parts x parts of them).
+Environment averaged_sky(int height, int parts, const std::function<Vec3f(const Vec3f& w)>& radiance);
 
 /// Environment SH coefficients, RGB for each i = l(l+1)+m, integrated texel by texel over exact solid angles
 /// (the bilinear function itself is integrated, so that a projection and a lookup agree).  `order` 1..10.

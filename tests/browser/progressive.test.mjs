@@ -1,7 +1,8 @@
 // Progressive meshes in the viewer: the same bits as C++ at every level.
 //
-// fixtures/progressive.bin is what core/lightfield/progressive_mesh.h wrote; progressive.txt has some of its levels:
-// splits, vertices, triangles, and SHA-256 of the geometry. progressive_mesh_test (C++) checks the same two files.
+// fixtures/progressive.bin and progressive_weights.bin are what core/lightfield/progressive_mesh.h wrote, light as floats
+// and as weights; the .txt beside each has some of its levels: splits, vertices, triangles, and SHA-256 of the geometry
+// and light. progressive_mesh_test (C++) checks the same files.
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
@@ -11,8 +12,9 @@ import { load } from './sources.mjs';
 
 const { ProgressiveMesh } = await load('light/progressive_mesh.ts');
 const fixture = (name) => readFileSync(new URL(`fixtures/${name}`, import.meta.url));
-const file = new Uint8Array(fixture('progressive.bin'));
-const levels = fixture('progressive.txt').toString().trim().split('\n').map((line) => line.split(' '));
+const bytesOf = (name) => new Uint8Array(fixture(`${name}.bin`));
+const levelsOf = (name) => fixture(`${name}.txt`).toString().trim().split('\n').map((line) => line.split(' '));
+const file = bytesOf('progressive');
 
 function hash(mesh) {
   const sum = createHash('sha256');
@@ -31,11 +33,13 @@ function expectLevel(mesh, [level, vertices, triangles, expected]) {
 }
 
 test('every level has the bits of the C++ decoder, forwards, backwards and by leaps', () => {
-  const mesh = new ProgressiveMesh(file);
-  assert.ok(levels.length > 5);
-  for (const line of levels) expectLevel(mesh, line);
-  for (const line of levels.toReversed?.() ?? [...levels].reverse()) expectLevel(mesh, line);
-  for (let i = 0; i < 40; ++i) expectLevel(mesh, levels[(i * 7) % levels.length]);
+  for (const name of ['progressive', 'progressive_weights']) {
+    const [mesh, levels] = [new ProgressiveMesh(bytesOf(name)), levelsOf(name)];
+    assert.ok(levels.length > 5);
+    for (const line of levels) expectLevel(mesh, line);
+    for (const line of [...levels].reverse()) expectLevel(mesh, line);
+    for (let i = 0; i < 40; ++i) expectLevel(mesh, levels[(i * 7) % levels.length]);
+  }
 });
 
 test('errors fall from level to level and end at none', () => {
@@ -55,10 +59,10 @@ test('what does not fit together is said in words', () => {
   };
   assert.throws(spoilt(0, 7), /version/);
   assert.throws(spoilt(3, 1 << 30), /base is larger/);
-  assert.throws(spoilt(10, 0x7fc00000), /not finite/); // the first position
+  assert.throws(spoilt(11, 0x7fc00000), /not finite/); // the first position
   const [vertices, triangles] = new Uint32Array(file.buffer, file.byteOffset + 20, 2);
   const width = [...new ProgressiveMesh(file).columns.values()].reduce((sum, c) => sum + c.width, 0);
-  const corners = 10 + width * vertices;
+  const corners = 11 + width * vertices;
   assert.throws(spoilt(corners, vertices), /base: triangle 0/);
   const splits = corners + 4 * triangles;
   assert.throws(spoilt(splits, 0), /split 0: it brings/);
@@ -71,8 +75,8 @@ test('whatever bytes are changed, a file is read or refused in words', () => {
   const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 ** 32;
   let refused = 0;
   for (let i = 0; i < 400; ++i) {
-    const copy = file.slice();
-    for (let k = 0; k < 3; ++k) copy[Math.floor(random() * (i % 2 ? 40 : copy.length))] = Math.floor(random() * 256);
+    const copy = bytesOf(i % 4 < 2 ? 'progressive' : 'progressive_weights');
+    for (let k = 0; k < 3; ++k) copy[Math.floor(random() * (i % 2 ? 44 : copy.length))] = Math.floor(random() * 256);
     try {
       new ProgressiveMesh(copy).goTo(1e9);
     } catch (e) {

@@ -87,7 +87,7 @@ TEST(LightFieldGlb, AProgressiveMeshTravelsWithTheScene) {
   EXPECT_EQ(read_progressive(file)->levels(), 1U);  // none there
   EXPECT_TRUE(read_progressive(file)->all.mesh.triangles.empty());
   const auto refused = read_progressive(
-      with_json(with, "\"KILN_progressive_mesh\":{\"version\":1", "\"KILN_progressive_mesh\":{\"version\":3"));
+      with_json(with, "\"KILN_progressive_mesh\":{\"version\":2", "\"KILN_progressive_mesh\":{\"version\":1"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "unsupported_version");
 }

@@ -8,6 +8,7 @@
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/progressive_glb.h"
 #include "core/bake/light_field_levels.h"
+#include "core/lightfield/polynomial_space.h"
 #include "core/lightfield/seen.h"
 #include "tests/core/bake/bake_input.h"
 
@@ -71,6 +72,31 @@ TEST(LightFieldBake, WhatLooksTheSameFromEverywhereIsThatOfRadiosity) {
   }
   // The specular layer keeps .04 at this angle and sends back most of it.
   EXPECT_NEAR(field_sum / light_sum, 1, 0.08);
+}
+
+TEST(LightFieldBake, InPolynomialsIsEvenInTheHeightAboveTheSurface) {
+  /// How much of the delivered coefficients no polynomial of the degree holds.
+  const auto beyond = [](const std::string& basis) {
+    const BakeOutput out = baked("column", R"({"steps":[{"do":"lightfield","degree":3,"rays":128,"subdivide":"off",
+      "simplify":"off","basis":")" + basis + R"("}],"quality":"final","certificate":false,
+      "environment":{"builtin":"clear"}})");
+    EXPECT_EQ(report_of(out)["parameters"]["lightfield"]["basis"], basis);
+    const auto shown = read_baked_glb(file(out, "scene.glb"));
+    EXPECT_TRUE(shown);
+    LightField folded = shown->field;
+    Threads threads(1);
+    keep_polynomials(folded, shown->scene.mesh.normal, threads);
+    double all = 0, changed = 0;
+    for (std::size_t i = 0; i < folded.coefficients.size(); ++i) {
+      all += std::pow(double{folded.coefficients[i]}, 2);
+      changed += std::pow(double{folded.coefficients[i] - shown->field.coefficients[i]}, 2);
+    }
+    return std::sqrt(changed / all);
+  };
+  const double of_series = beyond("sh"), of_polynomials = beyond("polynomial");
+  std::printf("%.4f of the harmonics, %.4f of the polynomials\n", of_series, of_polynomials);
+  EXPECT_LT(of_polynomials, 0.01);  // storage: .005 by area; here vertices count alike
+  EXPECT_GT(of_series, 5 * of_polynomials);
 }
 
 TEST(LightFieldBake, ThreadCountChangesNotOneByteOfTheScene) {

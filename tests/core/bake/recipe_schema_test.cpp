@@ -112,6 +112,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::pair{R"({"steps":[{"do":"lightfield","simplify":"on"}]})", false},
         std::pair{R"({"steps":[{"do":"lightfield","degree":9}]})", false},
         std::pair{R"({"steps":[{"do":"lightfield","basis":"wavelets"}]})", false},
+        std::pair{R"({"steps":[{"do":"lightfield","basis":"polynomial","degree":4}]})", true},
         std::pair{R"({"steps":[{"do":"prt","rays":6}]})", false}, std::pair{R"({"scene":{"asset":"zz"}})", false},
         std::pair{R"({"environment":{"builtin":"overcast","rotation_deg":-90}})", true},
         std::pair{R"({"environment":{"constant":[0,1,2]}})", true},

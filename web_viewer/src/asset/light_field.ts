@@ -3,12 +3,17 @@
 // k: the corners of a triangle, n: the interpolated normal, w: the way to the eye, raised to the horizon of n where it
 // is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
 //
+// Where the file keeps the sky apart (mirrored_sky.ts), what the sky adds belongs to the sum. That a vertex sees of it is
+// interpolated too.
+//
 // A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
-// c; what is left over follows, all of red first. 16 bytes a texel: 160 a vertex at degree 4, 304 at 6, 496 at 8.
+// c; what is left over follows, all of red first; then texels of what is seen of the sky. 16 bytes a texel: 160 a vertex at
+// degree 4, 304 at 6, 496 at 8.
 
 import { coefficientsOf } from '../light/transfer';
 import { evaluateSh } from '../light/sh';
 import { componentRows, type StoredTransfer } from './kiln_reader';
+import { checkSky, kVisibilityCount, type MirroredSky, type SkyExtension } from './mirrored_sky';
 
 /// The root extension, as written.
 export interface LightFieldExtension {
@@ -22,14 +27,19 @@ export interface LightFieldExtension {
   attributes: string[];
   scale: number[];
   offset: number[];
+  sky?: SkyExtension;
 }
 
 /// r-RFs of the vertices of one primitive.
 export interface FieldTexels {
   degree: number;
-  halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(degree) of each vertex
+  sky: boolean; // the sky is kept apart
+  halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(this) of each vertex
   unit: number; // a coefficient is unit * half; a power of two
 }
+
+/// What a field holds for each vertex.
+export type FieldShape = Pick<FieldTexels, 'degree' | 'sky'>;
 
 const kName = 'KILN_light_field';
 const kMostDegree = 8;
@@ -38,8 +48,14 @@ const kLargestHalf = 65504;
 
 export const fieldCount = (degree: number): number => (degree + 1) ** 2;
 
+const seriesTexels = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
+
 /// Texels of a vertex.
-export const texelsOf = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
+export const texelsOf = ({ degree, sky }: FieldShape): number =>
+  seriesTexels(degree) + (sky ? Math.ceil(kVisibilityCount / 8) : 0);
+
+/// Which half of a vertex is coefficient `i` of what it sees of the sky. Those are not in units.
+export const skyHalfAt = (degree: number, i: number): number => 8 * seriesTexels(degree) + i;
 
 /// Which half of a vertex is coefficient `i` of channel `c`.
 export function halfAt(degree: number, i: number, c: number): number {
@@ -72,6 +88,7 @@ function checkField(e: LightFieldExtension): void {
   must(`${e.attributes}` === `${names}`, 'attributes', `must be _SLF_0 and on, ${names.length} of them`);
   for (const list of ['scale', 'offset'] as const)
     must(e[list]?.length === rank && e[list].every(Number.isFinite), list, `must be ${rank} numbers`);
+  if (e.sky) checkSky(e.sky, `/extensions/${kName}/sky`);
 }
 
 /// What the stored numbers mean, as if they were transfer vectors. `bytesIn`: of a buffer view.
@@ -85,33 +102,52 @@ export function storedField(
   return { ...shape, rows: componentRows(shape, bytesIn(e.components!.bufferView).slice().buffer) };
 }
 
-/// `attributes`: the `_SLF_k` of a primitive. Components are expanded, once: rank * 3 (degree + 1)^2 products a vertex.
-/// Throws on what is not finite.
-export function fieldTexels(field: StoredTransfer, attributes: readonly Float32Array[]): FieldTexels {
+/// `attributes`: the `_SLF_k` of a primitive; `sky`: its `_SLF_SKY_k`, and what they mean. Components are expanded, once:
+/// rank * 3 (degree + 1)^2 products a vertex. Throws on what is not finite.
+export function fieldTexels(
+  field: StoredTransfer,
+  attributes: readonly Float32Array[],
+  sky?: { extension: SkyExtension; attributes: readonly Float32Array[] },
+): FieldTexels {
   const degree = field.order - 1;
   const stride = 3 * field.slots;
   const vertices = attributes[0].length / 4;
-  const out = emptyTexels(degree, vertices, largestOf(field));
-  const write = texelWriter(out);
+  const out = emptyTexels({ degree, sky: sky !== undefined }, vertices, largestOf(field));
+  const { series, visibility } = texelWriter(out);
   for (let first = 0; first < vertices; first += kBatch) {
     const numbers = coefficientsOf(field, attributes.map((all) => all.subarray(4 * first, 4 * (first + kBatch))));
-    for (let from = 0, v = first; from < numbers.length; from += stride, ++v) write(v, numbers, from);
+    for (let from = 0, v = first; from < numbers.length; from += stride, ++v) series(v, numbers, from);
+  }
+  if (!sky) return out;
+  const { scale, offset } = sky.extension;
+  const own = new Float32Array(kVisibilityCount);
+  for (let v = 0; v < vertices; ++v) {
+    for (let i = 0; i < own.length; ++i) own[i] = offset[i] + scale[i] * sky.attributes[i >> 2][4 * v + (i & 3)];
+    visibility(v, own, 0);
   }
   return out;
 }
 
 /// Zeros, for coefficients of at most `largest`.
-export function emptyTexels(degree: number, vertices: number, largest: number): FieldTexels {
+export function emptyTexels(shape: FieldShape, vertices: number, largest: number): FieldTexels {
   const unit = 2 ** Math.ceil(Math.log2((largest || 1) / kLargestHalf));
-  return { degree, halves: new Uint16Array(8 * texelsOf(degree) * vertices), unit };
+  return { ...shape, halves: new Uint16Array(8 * texelsOf(shape) * vertices), unit };
 }
 
-/// Writes the coefficients of a vertex, those of red first, which stand at `from` of `numbers`.
-export function texelWriter({ degree, halves, unit }: FieldTexels) {
-  const [count, width] = [fieldCount(degree), 8 * texelsOf(degree)];
+/// Functions that write the coefficients of a vertex, those of red first, or what it sees of the sky; both stand at `from`
+/// of `numbers`.
+export function texelWriter(field: FieldTexels) {
+  const { degree, halves, unit } = field;
+  const [count, width] = [fieldCount(degree), 8 * texelsOf(field)];
   const places = Array.from({ length: 3 * count }, (_, s) => halfAt(degree, s % count, Math.floor(s / count)));
-  return (vertex: number, numbers: Float32Array, from: number): void => {
-    for (let s = 0; s < places.length; ++s) halves[width * vertex + places[s]] = halfOf(numbers[from + s] / unit);
+  return {
+    series: (vertex: number, numbers: Float32Array, from: number): void => {
+      for (let s = 0; s < places.length; ++s) halves[width * vertex + places[s]] = halfOf(numbers[from + s] / unit);
+    },
+    visibility: (vertex: number, numbers: Float32Array, from: number): void => {
+      for (let i = 0; i < kVisibilityCount; ++i)
+        halves[width * vertex + skyHalfAt(degree, i)] = halfOf(numbers[from + i]);
+    },
   };
 }
 
@@ -156,20 +192,35 @@ export function reflectedView(normal: Vector, view: Vector): Vector {
   return normal.map((n, a) => 2 * Math.max(0, above) * n - (size > 0 ? raised[a] / size : n)) as unknown as Vector;
 }
 
-/// Radiance that an eye sees between three vertices: (8). `weights` are barycentric.
+/// What mirrors the sky at a place, and the sky.
+export interface Mirror {
+  sky: MirroredSky;
+  f0: Vector;
+  roughness: number;
+}
+
+/// Radiance that an eye sees between three vertices: (8). `weights` are barycentric. `mirror`: where the sky is kept apart.
 export function seenRadiance(
   field: FieldTexels,
   corners: Vector,
   weights: Vector,
   normal: Vector,
   view: Vector,
+  mirror?: Mirror,
 ): number[] {
   const y = new Float64Array(fieldCount(field.degree));
-  evaluateSh(field.degree + 1, ...reflectedView(normal, view), y);
-  const width = 8 * texelsOf(field.degree);
-  const along = (vertex: number, c: number) =>
-    y.reduce((sum, yi, i) => sum + yi * numberOfHalf(field.halves[width * vertex + halfAt(field.degree, i, c)]), 0);
-  return [0, 1, 2].map((c) =>
-    Math.max(0, field.unit * corners.reduce((sum, vertex, k) => sum + weights[k] * along(vertex, c), 0)),
+  const r = reflectedView(normal, view);
+  evaluateSh(field.degree + 1, ...r, y);
+  const width = 8 * texelsOf(field);
+  const at = (vertex: number, half: number) => numberOfHalf(field.halves[width * vertex + half]);
+  const mixed = (half: number) => corners.reduce((sum, vertex, k) => sum + weights[k] * at(vertex, half), 0);
+  const series = [0, 1, 2].map(
+    (c) => field.unit * y.reduce((sum, yi, i) => sum + yi * mixed(halfAt(field.degree, i, c)), 0),
   );
+  if (!field.sky || !mirror) return series.map((x) => Math.max(0, x));
+  const visibility = Array.from({ length: kVisibilityCount }, (_, i) => mixed(skyHalfAt(field.degree, i)));
+  const above = dot(normal, r);
+  const raised = normal.map((n, a) => 2 * above * n - r[a]) as unknown as Vector;
+  const added = mirror.sky.seen(normal, raised, mirror.f0, mirror.roughness, visibility);
+  return series.map((x, c) => Math.max(0, x + added[c]));
 }

@@ -7,6 +7,7 @@
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
 import { type FieldTexels, fieldTexels, readLightField, storedField } from './light_field';
+import { readSky, type SkyData, type SkyExtension } from './mirrored_sky';
 import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
 import {
   arrivingTransfers,
@@ -33,6 +34,14 @@ export interface Unpacked {
   baked: BakedPrimitive[]; // in the order of the file
   links: LightLinks | null; // for lamps that move
   progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
+  sky: SkyData | null; // that the light field keeps apart
+}
+
+/// A light field on its way out of the file.
+interface StoredField {
+  series: StoredTransfer;
+  extension: SkyExtension | undefined;
+  sky: SkyData | null;
 }
 
 interface Json {
@@ -132,6 +141,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
     links,
     progressive,
+    sky: field?.sky ?? null,
   };
 }
 
@@ -144,16 +154,18 @@ function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLink
 }
 
 /// Light fields stay out of the GLB too.
-function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredTransfer | null {
+function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredField | null {
   const extension = readLightField(json);
-  return extension ? storedField(takeExtension(json, kField, extension), bytesIn) : null;
+  if (!extension) return null;
+  const { sky } = takeExtension(json, kField, extension);
+  return { series: storedField(extension, bytesIn), extension: sky, sky: sky ? readSky(sky, bytesIn) : null };
 }
 
 /// A copy: light/progressive_mesh.ts reads it when it is asked for.
 function takeProgressive(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>) {
   const extension = json.extensions?.[kProgressive] as { version: number; bufferView: number } | undefined;
   if (!extension) return null;
-  if (extension.version !== 1) throw new Error(`/extensions/${kProgressive}/version: only version 1 is read`);
+  if (extension.version !== 2) throw new Error(`/extensions/${kProgressive}/version: only version 2 is read`);
   return bytesIn(takeExtension(json, kProgressive, extension).bufferView).slice();
 }
 
@@ -232,7 +244,7 @@ function takeBaked(
   primitive: Primitive,
   mesh: DracoMesh,
   extension: RadianceTransferExtension,
-  light: StoredTransfer | null,
+  light: StoredField | null,
 ): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
   const floatsOf = (name: string, components: number) => {
@@ -242,8 +254,11 @@ function takeBaked(
   const own = primitive.extensions!.KILN_radiance_transfer as { glossy?: boolean };
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
-  const field = light && fieldTexels(light, light.attributes.map((name) => floatsOf(name, 4)));
-  const taken = [...names, ...matrices, ...(light?.attributes ?? []), 'COLOR_0'];
+  const all = (list: readonly string[]) => list.map((name) => floatsOf(name, 4));
+  const seenSky = light?.extension;
+  const sky = seenSky && { extension: seenSky, attributes: all(seenSky.attributes) };
+  const field = light && fieldTexels(light.series, all(light.series.attributes), sky);
+  const taken = [...names, ...matrices, ...(light?.series.attributes ?? []), ...(sky?.extension.attributes ?? []), 'COLOR_0'];
   for (const name of taken) delete primitive.attributes[name];
   const [positions, normals] = [floatsOf('POSITION', 3), floatsOf('NORMAL', 3)];
   return { stored, weights, field, positions, normals, indices: mesh.indices() };

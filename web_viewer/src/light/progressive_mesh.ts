@@ -1,5 +1,7 @@
-// A lit mesh at every level of detail, from the bytes of KILN_progressive_mesh (core/lightfield/README.md). Stands alone.
+// A lit mesh at every level of detail, from the bytes of KILN_progressive_mesh (core/lightfield/README.md).
 // Level k is the base and k splits. Nothing is added up: each level has the bits of core/lightfield/progressive_mesh.h.
+
+import { kVisibilityCount } from '../asset/mirrored_sky';
 
 /// Numbers of each vertex (or row): an array and how many of its elements a vertex has.
 interface Column {
@@ -17,11 +19,12 @@ interface Header {
   splits: number;
   turned: number;
   moved: number;
+  rank: number; // of light, 0: floats
 }
 
 const kName = 'KILN_progressive_mesh';
-const kMagic = 0x4d504b31;
-const kHeader = 40; // bytes
+const kMagic = 0x4d504b32;
+const kHeader = 44; // bytes
 const kSplit = 5; // words: counts, turned corners, two parents, error
 const kParents = 2;
 const kError = 4;
@@ -33,6 +36,7 @@ const kOptional = [
   { bit: 2, name: 'uv1', width: 2 },
   { bit: 4, name: 'color', width: 4 },
   { bit: 8, name: 'tangent', width: 4 },
+  { bit: 32, name: 'visibility', width: kVisibilityCount },
 ] as const;
 
 function fail(what: string): never {
@@ -41,13 +45,13 @@ function fail(what: string): never {
 
 function readHeader(buffer: ArrayBuffer): Header {
   if (buffer.byteLength < kHeader || buffer.byteLength % 4 !== 0) fail('the header is not whole');
-  const [magic, degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved] = new Uint32Array(
+  const [magic, degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank] = new Uint32Array(
     buffer,
     0,
     kHeader / 4,
   );
-  if (magic !== kMagic || degree > kMostDegree || has > 31) fail('the version is not known');
-  return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved };
+  if (magic !== kMagic || degree > kMostDegree || has > 63 || rank > 3 * (degree + 1) ** 2) fail('the version is not known');
+  return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank };
 }
 
 /// Columns of vertices in the order of the file.
@@ -58,6 +62,31 @@ function columnsOf(h: Header): { name: string; width: number }[] {
     ...kOptional.filter(({ bit }) => h.has & bit),
     { name: 'coefficients', width: 3 * (h.degree + 1) ** 2 },
   ];
+}
+
+/// How light comes from codes: weight k is offset[k] + scale[k] code, and light the mean and the rows by their weights.
+interface LightForm {
+  scale: Float32Array;
+  offset: Float32Array;
+  rows: Float32Array; // the mean, then one for each weight
+}
+
+/// Sums in the order of core/lightfield/progressive_bytes.cpp, in double, rounded once: the same bits.
+function decodeLight({ scale, offset, rows }: LightForm, codes: Uint16Array, vertices: number): Float32Array {
+  const rank = scale.length;
+  const width = rows.length / (rank + 1);
+  const out = new Float32Array(width * vertices);
+  const sum = new Float64Array(width);
+  for (let v = 0; v < vertices; ++v) {
+    sum.set(rows.subarray(0, width));
+    for (let k = 0; k < rank; ++k) {
+      const weight = offset[k] + scale[k] * codes[rank * v + k];
+      const first = (k + 1) * width;
+      for (let s = 0; s < width; ++s) sum[s] += weight * rows[first + s];
+    }
+    out.set(sum, width * v);
+  }
+  return out;
 }
 
 export class ProgressiveMesh {
@@ -87,10 +116,15 @@ export class ProgressiveMesh {
     const buffer = bytes.slice().buffer as ArrayBuffer;
     const h = readHeader(buffer);
     const columns = columnsOf(h);
-    const width = columns.reduce((sum, c) => sum + c.width, 0);
+    const light = columns[columns.length - 1].width;
+    const width = columns.reduce((sum, c) => sum + c.width, 0) - (h.rank > 0 ? light : 0);
+    const codeWords = (count: number) => Math.ceil((h.rank * count) / 2);
     const words =
       kHeader / 4 +
+      (h.rank > 0 ? 2 * h.rank + (h.rank + 1) * light : 0) +
       width * (h.vertices + h.moved) +
+      codeWords(h.vertices) +
+      codeWords(h.moved) +
       h.triangles * (h.has & kPart ? 4 : 3) +
       kSplit * h.splits +
       h.turned +
@@ -99,15 +133,21 @@ export class ProgressiveMesh {
     let at = kHeader;
     const floats = (count: number) => new Float32Array(buffer, (at += 4 * count) - 4 * count, count);
     const integers = (count: number) => new Uint32Array(buffer, (at += 4 * count) - 4 * count, count);
+    const codes = (count: number) => new Uint16Array(buffer, (at += 4 * codeWords(count)) - 4 * codeWords(count), h.rank * count);
+    const form = { scale: floats(h.rank), offset: floats(h.rank), rows: floats(h.rank > 0 ? (h.rank + 1) * light : 0) };
+    const column = (c: { name: string; width: number }, count: number): Column => ({
+      values: h.rank > 0 && c.name === 'coefficients' ? decodeLight(form, codes(count), count) : floats(c.width * count),
+      width: c.width,
+    });
     this.degree = h.degree;
-    this.columns = new Map(columns.map((c) => [c.name, { values: floats(c.width * h.vertices), width: c.width }]));
+    this.columns = new Map(columns.map((c) => [c.name, column(c, h.vertices)]));
     this.triangles = integers(3 * h.triangles);
     this.part = integers(h.has & kPart ? h.triangles : 0);
     this.splits = integers(kSplit * h.splits);
     this.errors = new Float32Array(buffer, this.splits.byteOffset, this.splits.length);
     this.turned = integers(h.turned);
     this.movedVertex = integers(h.moved);
-    this.moved = columns.map((c) => ({ values: floats(c.width * h.moved), width: c.width }));
+    this.moved = columns.map((c) => column(c, h.moved));
     this.levels = h.splits + 1;
     this.vertexCount = h.baseVertices;
     this.triangleCount = h.baseTriangles;
