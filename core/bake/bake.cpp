@@ -123,6 +123,7 @@ struct Pass {
   std::size_t rank = 0;  // of the stored components; 0: raw
   BakedScene decoded;
   std::uint64_t bounce_rays = 0;
+  std::optional<MergeOutcome> merge;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
@@ -169,7 +170,8 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   return out;
 }
 
-/// Leaves the refined surface in `in.scene`.
+/// Leaves the surface that is the truth in `in.scene`: the refined one, or where vertices were merged that of the
+/// input.
 Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::optional<Environment>& light, Plan plan,
                        BakeLog& log, Threads& threads) {
   Scene& scene = in.scene;
@@ -179,6 +181,8 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   Transport transport;
   std::unique_ptr<LinksStep> links;
   std::optional<OutgoingLight> outgoing;
+  std::optional<Mesh> unmerged;
+  if (plan.merge) unmerged = scene.mesh;
   if (carried) {
     transport.transfer = in.diffuse;
     outgoing.emplace(OutgoingLight{.field = in.field, .sky = in.sky});
@@ -200,6 +204,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   const double left_out = transport.glossy.left_out, glossy_noise = transport.glossy.noise;
   const NoiseProbes noise = std::move(transport.noise);
   pass.bounce_rays = transport.bounce_rays;
+  pass.merge = transport.merge;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   std::optional<LightFieldStage> stage;
   if (outgoing) stage.emplace(baked, std::move(*outgoing), plan, log, threads);
@@ -211,6 +216,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
   scene = stage ? stage->take_surface() : std::move(baked.scene);
+  if (unmerged) scene.mesh = std::move(*unmerged);
   baked = {};  // from here on the delivered file is what counts
   KILN_TRY(decoded, reopen(glb, scene));
   threads.check();
@@ -226,7 +232,10 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     pass.certificate = certify(
         decoded, truth, light,
         {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
-    if (!plan.radiosity) pass.sources = split_error(*pass.certificate, decoded, noise, storage, plan.tail_left);
+    if (!plan.radiosity) {
+      const double merging = pass.merge ? pass.merge->error : 0;
+      pass.sources = split_error(*pass.certificate, decoded, {noise, storage, plan.tail_left, merging});
+    }
   }
   if (stage) {
     KILN_TRY(outcome,
@@ -353,6 +362,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .streams = pass.streams,
                                           .rank = pass.rank,
                                           .certificate = pass.certificate,
+                                          .merge = pass.merge,
                                           .sources = pass.sources,
                                           .grid = pass.grid,
                                           .links = pass.links,

@@ -32,7 +32,8 @@ json record_json(const PassRecord& p) {
           {"interval", {p.low, p.high}},
           {"own_relrmse", optional_json(p.own_relrmse)},
           {"own_high", optional_json(p.own_high)},
-          {"sources", {s.noise, s.noise_of_reflections, s.bounce_tail, s.quantisation, s.compression, s.interpolation}},
+          {"sources",
+           {s.noise, s.noise_of_reflections, s.bounce_tail, s.quantisation, s.compression, s.interpolation, s.merging}},
           {"truncation", optional_json(s.truncation)}};
 }
 
@@ -60,6 +61,7 @@ PassRecord read_record(const json& value) {
                       .quantisation = s.at(3).get<double>(),
                       .compression = s.at(4).get<double>(),
                       .interpolation = s.at(5).get<double>(),
+                      .merging = s.at(6).get<double>(),
                       .truncation = optional_number(value.at("truncation"))}};
 }
 

@@ -72,20 +72,23 @@ double squared(const Judged& judged, const Probes& probes, std::size_t slots) {
 
 }  // namespace
 
-ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const NoiseProbes& noise,
-                         const StorageProbes& storage, double tail_left) {
+ErrorSources split_error(const Certificate& certificate, const BakedScene& decoded, const KnownErrors& known) {
   const Judged judged(certificate, decoded);
   const auto slots = static_cast<std::size_t>(decoded.transfer.slots());
   const auto of_one_draw = [&](const Probes& twice) { return kInterpolated * squared(judged, twice, slots) / 2; };
-  const double direct = of_one_draw(noise.direct), reflected = of_one_draw(noise.reflected), rays = direct + reflected;
-  const double steps = kInterpolated * squared(judged, storage.rounding, slots);
-  const double rest = squared(judged, storage.left_out, slots);  // alike at a triangle's corners
+  const double direct = of_one_draw(known.noise.direct), reflected = of_one_draw(known.noise.reflected),
+               rays = direct + reflected;
+  const double steps = kInterpolated * squared(judged, known.storage.rounding, slots);
+  const double rest = squared(judged, known.storage.left_out, slots);  // alike at a triangle's corners
   ErrorSources out{.noise = root(rays),
                    .noise_of_reflections = root(reflected),
-                   .bounce_tail = tail_left,
+                   .bounce_tail = known.tail_left,
                    .quantisation = root(steps),
                    .compression = root(rest)};
-  out.interpolation = root(square(certificate.transport.relrmse) - rays - steps - rest - square(tail_left));
+  const double left =
+      std::max(0.0, square(certificate.transport.relrmse) - rays - steps - rest - square(known.tail_left));
+  out.merging = std::min(known.merging, root(left));  // an estimate, and half of it is seen again by the next vertices
+  out.interpolation = root(left - square(out.merging));
   if (certificate.job_light && !certificate.transport.by_lighting.empty()) {
     const auto own = std::ranges::find(certificate.lightings, decoded.light.name);
     const bool known = own != certificate.lightings.end() && !decoded.light.coefficients.empty();

@@ -5,11 +5,12 @@
 //   variance;
 //                  noise_of_reflections is the part of it that the rays between surfaces have
 //   bounce_tail    share of the light in reflections beyond the last, from the plan's sample paths
+//   merging        vertices that the input had and the result has not, as estimated when they went (merge_step.h)
 //   quantisation   rounding of the stored numbers, compression   components that are not stored: what a reader finds at
 //                  the same vertices
 //   interpolation  what of the measured error the others leave: light that changes within triangles
 //   truncation     what the order cannot hold of the job's own light; beside the transport error, not part of it
-// The five are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
+// The six are squares that sum to the certificate's relRMSE, unless the estimates alone exceed it.
 
 #include <optional>
 
@@ -23,10 +24,17 @@ namespace kiln {
 
 struct ErrorSources {
   double noise = 0, noise_of_reflections = 0, bounce_tail = 0, quantisation = 0, compression = 0, interpolation = 0;
+  double merging = 0;
   std::optional<double> truncation;
 };
 
-ErrorSources split_error(const Certificate&, const BakedScene& decoded, const NoiseProbes& noise, const StorageProbes&,
-                         double tail_left);
+/// What the bake knows beside the certificate.
+struct KnownErrors {
+  const NoiseProbes& noise;
+  const StorageProbes& storage;
+  double tail_left = 0, merging = 0;
+};
+
+ErrorSources split_error(const Certificate&, const BakedScene& decoded, const KnownErrors&);
 
 }  // namespace kiln

@@ -7,6 +7,7 @@
 
 #include "core/bake/direct_source.h"
 #include "core/bake/lightings.h"
+#include "core/bake/merge_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/transport.h"
 #include "core/prt/direct_transfer.h"
@@ -57,8 +58,13 @@ struct Sizes {
 };
 
 Sizes sizes_of(const Plan& plan, const Mesh& input) {
-  const auto t = static_cast<double>(input.triangles.size()), v = static_cast<double>(input.position.size());
+  auto t = static_cast<double>(input.triangles.size()), v = static_cast<double>(input.position.size());
   const bool open = plan.costs.sky_rays == 0 && plan.costs.lamp_rays == 0;  // light changes nowhere
+  if (plan.merge) {
+    const auto kept = static_cast<double>(plan.merge->triangles);
+    v *= kept / std::max(t, 1.0);
+    t = kept;
+  }
   if (!plan.split || open) return {t, v, 0};
   const auto triangles = static_cast<double>(plan.subdivide.triangles);
   const double boundary = std::clamp(2 * v - t, 0.0, 3 * t) * std::sqrt(triangles / std::max(t, 1.0));
@@ -113,6 +119,27 @@ MatrixCosts matrix_costs(const Plan& plan, double vertices, double price) {
           .bytes = 95 * count + 4 * (kComponents + 1) * numbers + 5e4};
 }
 
+/// Of merging, which looks at the input twice by few rays (merge_step.h). Simplification took 40 to 60 us a vertex.
+struct MergeCosts {
+  double rays = 0, seconds = 0, memory = 0;
+};
+
+MergeCosts merge_costs(const Plan& plan, double vertices, double slots, double more) {
+  if (!plan.merge) return {};
+  constexpr double kSimplify = 5e-5, kSimplifyMemory = 700;
+  const PointCosts& costs = plan.costs;
+  const double share = rough_share(plan, costs.sky_rays * more) * more, lamps = more / kRoughRays;
+  const double price = costs.sky_rays > 0 ? costs.sky_seconds / costs.sky_rays : 0;
+  const Interreflection few{.bounces = std::min(plan.bounces, kMergeReflections),
+                            .samples = std::max(16, plan.bounce_samples / kRoughRays)};
+  const double reflected = few.bounces > 0 ? static_cast<double>(rays_per_vertex(few)) : 0;
+  return {.rays = 2 * vertices * (costs.sky_rays * share + costs.lamp_rays * lamps + reflected),
+          .seconds = vertices * (2 * (costs.sky_seconds * share + costs.lamp_seconds * lamps +
+                                      reflected * kReflectedPrice * price) +
+                                 kSimplify),
+          .memory = vertices * (kSimplifyMemory + 4 * slots * (plan.bounces > 0 ? 12 : 4))};
+}
+
 }  // namespace
 
 PointCosts measure_costs(const Tracer& tracer, const Plan& plan, Threads& threads) {
@@ -164,6 +191,7 @@ Prediction predict(const Plan& plan, const Scene& scene) {
   const double certificate = 0.12 + 0.04 * traced;
 
   const MatrixCosts matrices = matrix_costs(plan, sizes.vertices, price);
+  const MergeCosts merging = merge_costs(plan, static_cast<double>(scene.mesh.position.size()), slots, more);
   double pixels = 0, files = 0;
   for (const Image& image : scene.images) {
     pixels += static_cast<double>(image.rgba.size());
@@ -173,10 +201,10 @@ Prediction predict(const Plan& plan, const Scene& scene) {
   Prediction out;
   out.triangles = static_cast<std::uint64_t>(sizes.triangles);
   out.vertices = static_cast<std::uint64_t>(sizes.vertices);
-  out.rays = static_cast<std::uint64_t>(sky_rays + lamp_rays + reflected + matrices.rays);
-  out.seconds = 0.05 + traced + splitting + writing + certificate + matrices.seconds;
-  out.memory_bytes =
-      static_cast<std::uint64_t>(24e6 + sizes.vertices * (620 + 40 * slots) + 2 * pixels + 2 * files + matrices.memory);
+  out.rays = static_cast<std::uint64_t>(sky_rays + lamp_rays + reflected + matrices.rays + merging.rays);
+  out.seconds = 0.05 + traced + splitting + writing + certificate + matrices.seconds + merging.seconds;
+  const double baking = sizes.vertices * (620 + 40 * slots) + matrices.memory;
+  out.memory_bytes = static_cast<std::uint64_t>(24e6 + std::max(baking, merging.memory) + 2 * pixels + 2 * files);
   out.artifact_bytes = static_cast<std::uint64_t>(
       2000 + 2500 * static_cast<double>(scene.parts.size()) + files + 4.5 * (sizes.vertices + input_vertices) +
       sizes.vertices * stored_bytes_of_vertex(plan, slots) + matrices.bytes);

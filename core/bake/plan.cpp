@@ -88,10 +88,35 @@ void plan_lamps(Plan& plan, const Scene& scene) {
                     : "the scene has neither emitters nor punctual lights");
 }
 
+/// The surface may move by a tenth of the error that merging may add.
+void plan_merging(Plan& plan, const Scene& scene, const PrtStep& step, const Effort& effort) {
+  constexpr double kReach = 0.1, kWorth = 0.6;  // of the triangles: above it there is little to win
+  constexpr std::uint64_t kFew = 2000;          // that are gone cost less than finding them
+  using Mode = PrtStep::Merge;
+  if (step.merge == Mode::off) return decide(plan, "merge", "no", "turned off by the recipe");
+  MergePlan merge{.max_error = effort.merging, .max_reach = kReach * effort.merging};
+  const std::uint64_t input = scene.mesh.triangles.size();
+  const std::uint64_t shape = triangles_for_shape(scene.mesh, merge.max_reach);
+  merge.triangles = std::min(input, triangles_for_light(shape));
+  if (!step.subdivide.triangles) merge.added = effort.triangles;
+  const std::string reason = "within " + short_text(100 * merge.max_reach) +
+                             " % of its diagonal the shape needs about " + std::to_string(shape) + " of " +
+                             std::to_string(input) + " triangles, and with light at least " +
+                             std::to_string(merge.triangles);
+  const bool worth =
+      static_cast<double>(merge.triangles) < kWorth * static_cast<double>(input) && input - merge.triangles >= kFew;
+  if (step.merge == Mode::automatic && !worth)
+    return decide(plan, "merge", "no", "the input is coarse for what it shows: " + reason);
+  plan.merge = merge;
+  decide(plan, "merge", "to about " + std::to_string(merge.triangles) + " triangles",
+         step.merge == Mode::on ? kAsked : reason);
+}
+
 void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision& asked, const Effort& effort) {
   using Mode = PrtStep::Subdivision::Mode;
-  const std::uint64_t input = scene.mesh.triangles.size();
-  const std::uint64_t budget = asked.triangles.value_or(input + effort.triangles);
+  const std::uint64_t given = scene.mesh.triangles.size(), input = plan.merge ? plan.merge->triangles : given;
+  const std::uint64_t open = plan.merge ? budget_after(*plan.merge, input, given) : input + effort.triangles;
+  const std::uint64_t budget = asked.triangles.value_or(open);
   plan.split = asked.mode != Mode::off && budget > input;
   plan.subdivide = {.measure = asked.measure,
                     .alpha = asked.alpha,
@@ -100,7 +125,7 @@ void plan_subdivision(Plan& plan, const Scene& scene, const PrtStep::Subdivision
                     .max_depth = asked.max_depth};
   std::string reason = "the recipe's budget is above the input's " + std::to_string(input) + " triangles";
   if (!asked.triangles) {
-    reason = effort.reason + " adds " + std::to_string(effort.triangles) + " triangles where light changes";
+    reason = effort.reason + " adds " + std::to_string(budget - input) + " triangles where light changes";
   }
   if (budget <= input) reason = "the input's " + std::to_string(input) + " triangles use up the budget";
   if (asked.mode == Mode::off) reason = "turned off by the recipe";
@@ -122,13 +147,13 @@ void decide(Plan& plan, std::string decision, std::string value, std::string rea
 Effort effort_of(Quality quality) {
   switch (quality) {
     case Quality::draft:
-      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10, 0.02, 0.01};
+      return {"the draft quality", 4, 256, 64, 64, 0.01, 10'000, 2e-4F, 10, 0.02, 0.01, 0.01};
     case Quality::standard:
-      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12, 0.01, 0.005};
+      return {"the standard quality", 6, 1024, 256, 256, 0.002, 40'000, 5e-5F, 12, 0.01, 0.005, 0.005};
     case Quality::finest:
       break;
   }
-  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14, 0.0025, 0.002};
+  return {"the final quality", 6, 4096, 1024, 1024, 0.0005, 160'000, 1e-5F, 14, 0.0025, 0.002, 0.00125};
 }
 
 // The noise of stratified rays falls nearly as one over their number: about .1 at 16 on the bunny, .015 at 256.
@@ -141,6 +166,7 @@ Effort first_effort(const Promise& promise) {
   effort.triangles = static_cast<std::uint64_t>(std::clamp(100 / target, 500.0, 10'000.0));
   effort.bits = target >= 0.05 ? 10 : target >= 0.01 ? 12 : 14;
   effort.noise = target / 4;
+  effort.merging = target / 4;
   effort.compression = std::clamp(target / 10, 2e-4, 0.01);
   return effort;
 }
@@ -152,6 +178,7 @@ Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Th
   const Tracer tracer(scene, threads);
   plan_bounces(plan, tracer, step, effort, threads);
   plan_samples(plan, step, effort);
+  plan_merging(plan, scene, step, effort);
   plan_subdivision(plan, scene, step.subdivide, effort);
   plan_encoding(plan, step, effort);
   plan_matrices(plan, scene, step);

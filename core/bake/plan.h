@@ -8,6 +8,7 @@
 
 #include "core/bake/forecast.h"
 #include "core/bake/glossy_plan.h"
+#include "core/bake/merge_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
@@ -42,14 +43,15 @@ struct FieldPlan {
 struct Plan {
   int order = 6;
   int bounces = 0;
-  bool bounces_asked = false;  // by the recipe: then never skipped
-  double tail_left = 0;        // share of the light in later reflections; 0 where the recipe says how many
-  int samples = 1024;          // most rays per point for distant light
-  double noise = 0;            // relRMSE of these rays at which a point stops; 0: never
-  int bounce_samples = 256;    // rays per vertex and bounce
-  int lamp_samples = 64;       // shadow rays per point over all emitters
-  bool lamps = false;          // the scene has light of its own
-  bool split = false;          // subdivide at all
+  bool bounces_asked = false;      // by the recipe: then never skipped
+  double tail_left = 0;            // share of the light in later reflections; 0 where the recipe says how many
+  int samples = 1024;              // most rays per point for distant light
+  double noise = 0;                // relRMSE of these rays at which a point stops; 0: never
+  int bounce_samples = 256;        // rays per vertex and bounce
+  int lamp_samples = 64;           // shadow rays per point over all emitters
+  bool lamps = false;              // the scene has light of its own
+  std::optional<MergePlan> merge;  // before splits
+  bool split = false;              // subdivide at all
   Subdivide subdivide;
   PrtStep::Encoding encoding;
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
@@ -79,6 +81,7 @@ struct Effort {
   int bits = 12;
   double noise = 0.01;         // of direct light at a point, as relRMSE: a fifth of the error the quality is for
   double compression = 0.005;  // relRMSE: a tenth of the error that the quality is for
+  double merging = 0.005;      // relRMSE, by its estimate: a tenth too, a quarter of what is promised
 };
 
 Effort effort_of(Quality);

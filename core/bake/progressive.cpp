@@ -102,7 +102,7 @@ double Passes::predicted(Growth g) const {
   const double reflected = square(s.noise_of_reflections), direct = square(s.noise) - reflected;
   return direct / g.direct + reflected / g.reflected +
          square(s.interpolation) * std::pow(g.triangles, -2 * interpolation_power()) + square(s.bounce_tail) +
-         square(s.quantisation) + square(s.compression);
+         square(s.quantisation) + square(s.compression) + square(s.merging);
 }
 
 /// The fewest rays that leave so much noise, by Lagrange: rays of each kind as the root of noise over cost.
@@ -162,10 +162,20 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
     plan.lamp_samples = more(last.lamp_samples, growth.direct);
     plan.bounce_samples = more(last.bounce_samples, growth.reflected);
   }
+  if (plan.merge) {
+    constexpr double kMerging = 0.25;  // of the error that is expected: a sixteenth of its square
+    const double share = kMerging * std::sqrt(predicted(growth)) / plan.merge->max_error;
+    const double less = std::min(1.0, share) / growth.triangles;  // shape may be what splits do not mend
+    plan.merge->max_error *= less;
+    plan.merge->max_reach *= less;
+    const std::uint64_t needed = triangles_for_light(triangles_for_shape(scene.mesh, plan.merge->max_reach));
+    plan.merge->triangles = std::min<std::uint64_t>(scene.mesh.triangles.size(), needed);
+  }
   if (growth.triangles > 1) {
     const double triangles = growth.triangles * static_cast<double>(all_.back().triangles);
     plan.subdivide.triangles = static_cast<std::uint64_t>(std::min(triangles, 5e7));
-    plan.split = plan.subdivide.triangles > scene.mesh.triangles.size();
+    plan.split = plan.merge || plan.subdivide.triangles > scene.mesh.triangles.size();
+    if (plan.merge) plan.merge->added = 0;
   }
   plan.prediction = predict(plan, scene);
   if (plan.prediction.memory_bytes > limits_.memory_mb << 20) {

@@ -125,6 +125,8 @@ PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors)
   fields.word("solver", {"vertices"});
   constexpr PrtStep::Glossy kGlossy[] = {PrtStep::Glossy::automatic, PrtStep::Glossy::on, PrtStep::Glossy::off};
   if (const auto glossy = fields.word("glossy", {"auto", "on", "off"})) step.glossy = kGlossy[*glossy];
+  constexpr PrtStep::Merge kMerge[] = {PrtStep::Merge::automatic, PrtStep::Merge::on, PrtStep::Merge::off};
+  if (const auto merge = fields.word("merge", {"auto", "on", "off"})) step.merge = kMerge[*merge];
   if (const json* value = fields.find("subdivide"))
     step.subdivide = read_subdivision(*value, pointer + "/subdivide", errors);
   if (const json* value = fields.find("encoding")) step.encoding = read_encoding(*value, pointer + "/encoding", errors);

@@ -57,6 +57,11 @@ struct PrtStep {
     on,
     off
   } glossy = Glossy::automatic;  // matrices: where they show, everywhere, nowhere
+  enum class Merge {
+    automatic,
+    on,
+    off
+  } merge = Merge::automatic;  // vertices that light and shape do not need: where they are many, always, never
 };
 
 /// Light of one job at the vertices: no order, nothing to turn (core/meshless/radiosity.h).

@@ -50,8 +50,8 @@ json encoding_json(const PrtStep::Encoding& e) {
   return {{"form", kForms[static_cast<int>(e.form)]}, {"rank", or_auto(e.rank)}, {"bits", or_auto(e.bits)}};
 }
 
-/// `glossy` is left out where it is auto, so that the hash of a recipe older than it, and with it the bytes of a scene
-/// without specular parts, are what they were.
+/// `glossy` and `merge` are left out where they are auto, so that the hash of a recipe older than them, and with it the
+/// bytes of a scene without specular parts or needless vertices, are what they were.
 json step_json(const PrtStep& step) {
   json out = {{"do", "prt"},
               {"order", or_auto(step.order)},
@@ -60,6 +60,7 @@ json step_json(const PrtStep& step) {
               {"subdivide", subdivision_json(step.subdivide)},
               {"encoding", encoding_json(step.encoding)}};
   if (step.glossy != PrtStep::Glossy::automatic) out["glossy"] = step.glossy == PrtStep::Glossy::on ? "on" : "off";
+  if (step.merge != PrtStep::Merge::automatic) out["merge"] = step.merge == PrtStep::Merge::on ? "on" : "off";
   return out;
 }
 

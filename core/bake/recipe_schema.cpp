@@ -45,6 +45,7 @@ std::string recipe_schema() {
         "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 64}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "samples": {"description": "rays per vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "solver": {"enum": ["vertices"], "default": "vertices"},
+        "merge": {"description": "collapse edges that light and shape do not need, before vertices are added where light changes: auto where the input has many, on always", "enum": ["auto", "on", "off"], "default": "auto"},
         "glossy": {"description": "transfer matrices for specular reflection: auto where it shows, on everywhere", "enum": ["auto", "on", "off"], "default": "auto"},
         "subdivide": {"$ref": "#/definitions/subdivide"},
         "encoding": {

@@ -217,6 +217,16 @@ ordered_json glossy_object(const GlossyReport& g) {
   return out;
 }
 
+ordered_json merge_object(const MergeOutcome& m) {
+  return {{"input_triangles", m.input_triangles},
+          {"input_vertices", m.input_vertices},
+          {"triangles", m.triangles},
+          {"vertices", m.vertices},
+          {"error", m.error},
+          {"distance_rms", m.distance_rms},
+          {"distance_max", m.distance_max}};
+}
+
 ordered_json radiosity_parameters(const Plan& plan) {
   const Radiosity& r = *plan.radiosity;
   return {{"scheme", "rows"},
@@ -267,6 +277,8 @@ ordered_json parameters_object(const Plan& plan) {
           {"threshold", plan.subdivide.threshold},
           {"max_depth", plan.subdivide.max_depth},
           {"compression", plan.compression},
+          {"merge_error", plan.merge ? plan.merge->max_error : 0},
+          {"merge_reach", plan.merge ? plan.merge->max_reach : 0},
           {"glossy_order", plan.glossy.order},
           {"glossy_samples", plan.glossy ? plan.glossy.samples : 0},
           {"glossy_compression", plan.glossy ? plan.glossy.compression : 0}};
@@ -283,6 +295,7 @@ ordered_json sources_object(const ErrorSources& s) {
                       {"interpolation", s.interpolation},
                       {"bounce_tail", s.bounce_tail},
                       {"quantisation", s.quantisation},
+                      {"merging", s.merging},
                       {"compression", s.compression}};
   if (s.truncation) out["truncation"] = *s.truncation;
   return out;
@@ -338,6 +351,7 @@ std::string report_json(const ReportInput& in) {
                       {"result", result_object(in)},
                       {"warnings", warning_list(in.input)},
                       {"certificate", certificate_object(in.certificate)}};
+  if (in.merge) out["merge"] = merge_object(*in.merge);
   if (in.sources) out["error_sources"] = sources_object(*in.sources);
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.links) out["links"] = links_object(*in.links);

@@ -11,6 +11,7 @@
 #include "core/bake/grid_outcome.h"
 #include "core/bake/light_field_stage.h"
 #include "core/bake/links_step.h"
+#include "core/bake/merge_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/progressive.h"
 
@@ -36,6 +37,7 @@ struct ReportInput {
   const std::vector<StreamBytes>& streams;
   std::size_t rank = 0;  // of the stored components; 0: raw
   const std::optional<Certificate>& certificate;
+  const std::optional<MergeOutcome>& merge;
   const std::optional<ErrorSources>& sources;
   const std::optional<GridOutcome>& grid;
   const std::optional<LinksOutcome>& links;

@@ -133,6 +133,10 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
   std::vector<StandIn> stand_ins;
   std::vector<std::uint32_t> probes;
   Transport out;
+  if (plan.merge) {
+    log.begin("merge", 0.2);
+    out.merge = merge_scene(scene, plan, band_power, seed, log, threads);
+  }
   log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);

@@ -2,9 +2,11 @@
 // The `prt` step: direct transfer while the mesh is refined, then reflections between its surfaces.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/bake/bake_log.h"
+#include "core/bake/merge_step.h"
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
 #include "core/prt/direct_transfer.h"
@@ -27,7 +29,8 @@ struct NoiseProbes {
 };
 
 struct Transport {
-  Transfer transfer;  // of scene.mesh's vertices
+  std::optional<MergeOutcome> merge;  // as planned
+  Transfer transfer;                  // of scene.mesh's vertices
   NoiseProbes noise;
   std::uint64_t bounce_rays = 0;
   GlossyBaked glossy;  // as planned

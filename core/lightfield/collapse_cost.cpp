@@ -23,40 +23,26 @@ double squared_diagonal(const std::vector<Vec3f>& position) {
   return dot(across, across) > 0 ? dot(across, across) : 1;
 }
 
-/// Column 3 i + c: channel c of neighbour i, minus that of v.
-std::vector<double> differences(const LightField& field, std::uint32_t v, const std::vector<std::uint32_t>& ring) {
-  const std::size_t count = field.count(), columns = 3 * ring.size();
-  std::vector<double> out(count * columns);
-  const std::vector<double> own = mean_light(field, v);
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    const std::vector<double> other = mean_light(field, ring[i]);
-    for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < count; ++k) out[k * columns + 3 * i + c] = other[c * count + k] - own[c * count + k];
-  }
-  return out;
-}
-
 }  // namespace
 
-CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Collapse how)
-    : mesh_(mesh), norm_(mesh.lit().field.degree), how_(how) {
-  const LitMesh& lit = mesh.lit();
-  const double area = surface_area(lit.mesh);
-  double light = 0;
-  for (const Triangle& t : lit.mesh.triangles) {
-    const double share = triangle_area(lit.mesh, t) / 3;
-    for (const std::uint32_t v : t) {
-      light += share * squared_norm(norm_, normalized(to_double(lit.mesh.normal[v])), mean_light(lit.field, v));
-    }
+CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Collapse how, double mean_square)
+    : mesh_(mesh), products_(mesh.lit().field), how_(how) {
+  const Mesh& m = mesh.mesh();
+  const double area = surface_area(m);
+  double light = mean_square * area;
+  for (const Triangle& t : m.triangles) {
+    if (mean_square > 0) break;
+    const double share = triangle_area(m, t) / 3;
+    for (const std::uint32_t v : t) light += share * products_.squared_norm(v, normalized(to_double(m.normal[v])));
   }
   if (area > 0) {
-    const double unit = kLengthUnit * kLengthUnit * squared_diagonal(lit.mesh.position);
+    const double unit = kLengthUnit * kLengthUnit * squared_diagonal(m.position);
     geometry_ = geometry_weight / (unit * area);
     even_ = kEvenness / (unit * area);
     light_ = light > 0 ? (1 - geometry_weight) / light : 0;  // mean |L|^2 is light / area
   }
   quadric_.resize(mesh.points()), area_.resize(mesh.points()), seams_.resize(mesh.points()),
-      gram_.resize(lit.mesh.position.size());
+      gram_.resize(m.position.size());
 }
 
 void CollapseCost::update_point(std::uint32_t p) {
@@ -84,12 +70,8 @@ void CollapseCost::update_point(std::uint32_t p) {
       const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
       if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
       if (!sides.crease || sides.triangles != 2 || sides.from[0] == sides.from[1]) continue;
-      const LightField& field = mesh_.lit().field;
       const Vec3d normal = normalized(to_double(mesh.normal[sides.from[0]]));
-      std::vector<double> across = mean_light(field, sides.from[0]);
-      const std::vector<double> side = mean_light(field, sides.from[1]);
-      for (std::size_t i = 0; i < across.size(); ++i) across[i] -= side[i];
-      const double jump = squared_norm(norm_, normal, across);
+      const double jump = products_.squared_distance(sides.from[0], sides.from[1], normal);
       seams_[p].push_back({x, static_cast<float>(jump)});
     }
   }
@@ -104,8 +86,7 @@ void CollapseCost::update_vertex(std::uint32_t v) {
     for (const std::uint32_t x : {a, b})
       if (std::ranges::find(g.ring, x) == g.ring.end()) g.ring.push_back(x);
   });
-  std::vector<double> columns = differences(mesh_.lit().field, v, g.ring);
-  norm_.products(normalized(to_double(mesh_.mesh().normal[v])), g.ring.size(), columns, g.product);
+  products_.of_differences(v, g.ring, normalized(to_double(mesh_.mesh().normal[v])), g.product);
 }
 
 double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const {
@@ -133,9 +114,9 @@ double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share,
       squared += x[k] * x[k] * product(i[k], i[k]);
       for (std::size_t j = 0; j < k; ++j) squared += 2 * x[k] * x[j] * product(i[k], i[j]);
     }
-    sum += area * std::max(0.0, squared);  // eq. 7
+    sum += area * squared;  // eq. 7
   });
-  return sum;
+  return std::max(0.0, sum);  // by rounding, or of products free of noise
 }
 
 double CollapseCost::seam_error(std::uint32_t p, std::uint32_t other, const Vec3d& place) const {

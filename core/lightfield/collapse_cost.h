@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "core/lightfield/collapse_mesh.h"
-#include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/field_products.h"
 #include "core/mesh/quadric.h"
 
 namespace kiln {
@@ -36,7 +36,8 @@ struct CollapsePlan {
 
 class CollapseCost {
  public:
-  CollapseCost(const CollapseMesh&, double geometry_weight, Collapse);
+  /// `mean_square` is |L|^2 of the light that errors are relative to; 0: the mean of the field's own.
+  CollapseCost(const CollapseMesh&, double geometry_weight, Collapse, double mean_square = 0);
 
   /// To be called once for all, and again for what a collapse changed. Calls for different points or vertices may run
   /// at the same time.
@@ -64,7 +65,7 @@ class CollapseCost {
   double light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
 
   const CollapseMesh& mesh_;
-  HemisphereNorm norm_;
+  FieldProducts products_;
   Collapse how_;
   double geometry_ = 0, light_ = 0, even_ = 0;  // factors of Q, of E and of area x squared length
   std::vector<Quadric> quadric_;                // of points

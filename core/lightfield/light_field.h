@@ -4,11 +4,15 @@
 // L(p, w) is the radiance that leaves p in direction w, a radiance function (RF). What is stored is its reflection
 // about the vertex' normal n, the r-RF: a highlight stands where its light is, so neighbours with other normals agree
 // and may be interpolated.
-// Paper   Vanhoey et al. 2015, 3.1 (after Wood et al. 2000).   Shape  coefficients[(3 vertex + channel) count + i]
+// Paper   Vanhoey et al. 2015, 3.1 (after Wood et al. 2000).
+// Shape   coefficients[(channels vertex + channel) count + i]; channels are red, green, blue
 // Units   W m^-2 sr^-1; w is unit, in world axes, and points away from the surface.
 // Below the horizon of n the series goes on with what it has at the horizon (section 7): the fit sees to it.
 // Where a vertex mirrors the sky more sharply than the series can, the sky's part may be kept apart: then there is
 // `visibility` too, and L~ is the series and what mirrored_sky.h adds.
+// A field of degree 0 may have other channels: any attribute whose distance is Euclid's, like transfer vectors. If it
+// was drawn twice by chance, the first channels are the means of the draws and the last `noise` ones half of their
+// differences.
 
 #include <array>
 #include <cstddef>
@@ -29,17 +33,18 @@ using SkyVisibility = std::array<float, kVisibilityCount>;
 
 struct LightField {
   int degree = 4;                   // bands 0 .. degree, (degree + 1)^2 coefficients of each channel
-  std::vector<float> coefficients;  // of red, then green, then blue, for each vertex
+  std::vector<float> coefficients;  // of one channel after the other, for each vertex
   std::vector<float> visibility;    // of the sky: kVisibilityCount harmonics for each vertex, or empty
   Vec3f sky;                        // what a visibility of 1 adds, in the mean: for distances only
+  std::size_t channels = 3;
+  std::size_t noise = 0;
 
   std::size_t count() const { return static_cast<std::size_t>(sh_count(degree + 1)); }
-  std::size_t vertices() const { return coefficients.size() / (3 * count()); }
-  std::span<const float> of(std::size_t vertex) const {
-    return {coefficients.data() + 3 * count() * vertex, 3 * count()};
-  }
+  std::size_t row() const { return channels * count(); }
+  std::size_t vertices() const { return coefficients.size() / row(); }
+  std::span<const float> of(std::size_t vertex) const { return {coefficients.data() + row() * vertex, row()}; }
   bool has_sky() const { return !visibility.empty(); }
-  std::span<float> of(std::size_t vertex) { return {coefficients.data() + 3 * count() * vertex, 3 * count()}; }
+  std::span<float> of(std::size_t vertex) { return {coefficients.data() + row() * vertex, row()}; }
 };
 
 /// The series of a vertex as distances see it: with the sky's part, as if the sky were even.
@@ -48,14 +53,14 @@ std::vector<double> mean_light(const LightField&, std::size_t vertex);
 /// Calls visit(array, numbers of a vertex) for each array of a field that has something.
 template <class Field, class Visit>
 void each_field_array(Field& field, const Visit& visit) {
-  visit(field.coefficients, 3 * field.count());
+  visit(field.coefficients, field.row());
   if (field.has_sky()) visit(field.visibility, kVisibilityCount);
 }
 
 /// Calls visit(array of a, array of b, numbers of a vertex) for each array that `b` has.
 template <class FieldA, class FieldB, class Visit>
 void each_field_array_of(FieldA& a, FieldB& b, const Visit& visit) {
-  visit(a.coefficients, b.coefficients, 3 * b.count());
+  visit(a.coefficients, b.coefficients, b.row());
   if (b.has_sky()) visit(a.visibility, b.visibility, kVisibilityCount);
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/base/expects.h"
 #include "core/lightfield/collapse_queue.h"
+#include "core/lightfield/collapse_reach.h"
 
 namespace kiln {
 namespace {
@@ -21,7 +22,8 @@ class Simplifier {
         lit_(std::move(lit)),
         points_(find_surface_points(lit_)),
         mesh_(lit_, points_),
-        cost_(mesh_, params.geometry_weight, params.collapse),
+        cost_(mesh_, params.geometry_weight, params.collapse, params.mean_square),
+        reach_(mesh_, params.max_reach),
         age_(mesh_.points(), 0) {
     if (params.record)
       out_.record.before = {.mesh = {},
@@ -89,11 +91,14 @@ class Simplifier {
   bool may_join(const CollapsePlan& plan) {
     if (!plan.possible || !mesh_.keeps_topology(plan.gone, plan.kept, plan.sides)) return false;
     const Vec3d place = to_double(plan.place);
-    return !mesh_.spoils(plan.gone, plan.kept, place) && !(plan.moves && mesh_.spoils(plan.kept, plan.gone, place));
+    if (mesh_.spoils(plan.gone, plan.kept, place) || (plan.moves && mesh_.spoils(plan.kept, plan.gone, place)))
+      return false;
+    return reach_.allows(plan);
   }
 
   void join(const CollapsePlan& plan) {
     summed_cost_ += plan.cost;
+    reach_.take(plan);
     moving_.clear();
     mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
       if (!plan.sides.goes(v)) moving_.push_back(v);
@@ -173,6 +178,7 @@ class Simplifier {
   SurfacePoints points_;
   CollapseMesh mesh_;
   CollapseCost cost_;
+  CollapseReach reach_;
   std::vector<std::uint32_t> age_;  // of a point: how often its candidates were renewed
   CollapseQueue queue_;
   double summed_cost_ = 0;

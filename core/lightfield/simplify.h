@@ -24,7 +24,9 @@ namespace kiln {
 struct Simplify {
   std::size_t triangles = 0;                                   // as few as this, where topology and shape allow
   double max_error = std::numeric_limits<double>::infinity();  // of `error` below: ends before it would be exceeded
+  double max_reach = std::numeric_limits<double>::infinity();  // how far the surface may move: collapse_reach.h
   double geometry_weight = 0.01;                               // 0 .. 1; the light has the rest
+  double mean_square = 0;  // of the light that `error` is relative to; 0: the field's own
   Collapse collapse = Collapse::edge;
   bool record = false;  // of every collapse, for progressive_mesh()
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // triangles, now and then

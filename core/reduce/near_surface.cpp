@@ -6,7 +6,7 @@
 
 #include "core/base/index_table.h"
 #include "core/base/random.h"
-#include "core/reduce/triangle_distance.h"
+#include "core/mesh/triangle_distance.h"
 
 namespace kiln {
 struct NearSurface::Cells {

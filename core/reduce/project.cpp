@@ -8,8 +8,8 @@
 
 #include "core/base/index_table.h"
 #include "core/base/random.h"
+#include "core/mesh/triangle_distance.h"
 #include "core/reduce/near_surface.h"
-#include "core/reduce/triangle_distance.h"
 
 namespace kiln {
 namespace {

@@ -32,7 +32,11 @@ TEST_P(SchemaAndParser, AgreeOnADocument) {
 INSTANTIATE_TEST_SUITE_P(
     Documents, SchemaAndParser,
     testing::Values(
-        std::pair{"{}", true}, std::pair{R"({"quality":"final"})", true}, std::pair{R"({"quality":"best"})", false},
+        std::pair{R"({"steps":[{"do":"prt","merge":"auto"}]})", true},
+        std::pair{R"({"steps":[{"do":"prt","merge":"on"}]})", true},
+        std::pair{R"({"steps":[{"do":"prt","merge":true}]})", false},
+        std::pair{R"({"steps":[{"do":"radiosity","merge":"on"}]})", false}, std::pair{"{}", true},
+        std::pair{R"({"quality":"final"})", true}, std::pair{R"({"quality":"best"})", false},
         std::pair{R"({"quality":{"target_error":0.1}})", true}, std::pair{R"({"quality":{"target_error":0}})", false},
         std::pair{R"({"quality":{"target_error":-0.1}})", false},
         std::pair{R"({"quality":{"target_error":1.5}})", false},

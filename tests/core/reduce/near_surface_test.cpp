@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/reduce/triangle_distance.h"
+#include "core/mesh/triangle_distance.h"
 #include "tests/core/reduce/models.h"
 
 namespace kiln {

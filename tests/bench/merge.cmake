@@ -1,0 +1,5 @@
+if(TARGET kiln_bake)
+  add_executable(kiln_merge merge.cpp)
+  kiln_flags(kiln_merge)
+  target_link_libraries(kiln_merge PRIVATE kiln_bake nlohmann_json::nlohmann_json)
+endif()
