@@ -44,6 +44,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"not_implemented", 501},
     {"overloaded", 503},
     {"draining", 503},
+    {"store_unavailable", 503},
     {"not_ready", 503},
     {"version_not_supported", 505},
     {"disk_full", 507},

@@ -7,6 +7,7 @@
 // All times are the store's own clock. Every function may be called from any thread.
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -76,9 +77,16 @@ struct StoreCounts {
   std::int64_t oldest_queued_ms = 0;  // creation time; 0 when nothing waits
 };
 
-/// Codes of faults: store_failed, disk_full (the database cannot grow), not_found, bad_cursor, queue_full,
-/// idempotency_mismatch, asset_not_found, poisoned (the same content crashed its worker twice within 24 h),
-/// not_terminal.
+/// Held from making a blob until a row refers to it, or alone while the bytes of forgotten blobs are removed: so that
+/// bytes which come again meanwhile are not taken away.
+class BlobGate {
+ public:
+  virtual ~BlobGate() = default;
+};
+
+/// Codes of faults: store_failed, store_unavailable (no connection to the database now: try again), disk_full (the
+/// database cannot grow), not_found, bad_cursor, queue_full, idempotency_mismatch, asset_not_found, poisoned (the same
+/// content crashed its worker twice within 24 h), not_terminal.
 class JobStore {
  public:
   virtual ~JobStore() = default;
@@ -125,6 +133,17 @@ class JobStore {
   virtual Result<bool> knows_blob(const std::string& sha256) = 0;
   /// Forgets blobs that nothing refers to and nobody touched for `grace`, and returns them: their files may go now.
   virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace) = 0;
+
+  /// Among those who make blobs; waits while somebody removes some.
+  virtual Result<std::unique_ptr<BlobGate>> enter_blob_gate() = 0;
+  /// Alone. "gate_busy" when others stay too long: try again later.
+  virtual Result<std::unique_ptr<BlobGate>> close_blob_gate() = 0;
+
+  /// Other programs write to this store as well: only the end of a lease tells that a worker is gone.
+  virtual bool shared() const = 0;
+  /// `wake` is called soon after another program wrote. A hint that may get lost: look every few seconds all the same.
+  /// At most once, before the store is used.
+  virtual void on_change(std::function<void()> wake) = 0;
 
   /// Writes and reads back one row: ready to serve.
   virtual Result<void> check_writable() = 0;

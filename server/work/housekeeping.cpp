@@ -22,7 +22,7 @@ Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
   });
   int removed = 0;
   for (const std::string& sha256 : old) {
-    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(alone, place.store.close_blob_gate());
     KILN_TRY(known, place.store.knows_blob(sha256));
     if (!known && place.blobs.remove(sha256)) ++removed;
   }
@@ -35,7 +35,7 @@ Result<int> collect_unused_blobs(const WorkPlace& place, Millis grace) {
   int removed = 0;
   {
     // Reference and removal meet here: an upload of the same bytes waits, and then writes them anew.
-    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(alone, place.store.close_blob_gate());
     KILN_TRY(unused, place.store.forget_unused_blobs(grace));
     for (const std::string& sha256 : unused) {
       if (place.blobs.remove(sha256)) ++removed;

@@ -166,7 +166,8 @@ class JobRun {
   }
 
   void store_results(const WorkerOutcome& outcome, const WorkFolder& folder) {
-    const std::shared_lock gate(place_.blob_gate);
+    const auto gate = place_.store.enter_blob_gate();
+    if (!gate) return after_trouble(gate.error());
     std::vector<std::filesystem::path> files;
     for (const WorkerArtifact& named : outcome.artifacts) files.push_back(folder.result(named.name));
     const auto stored = place_.blobs.adopt(files);

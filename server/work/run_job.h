@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <filesystem>
-#include <shared_mutex>
 #include <string>
 #include <vector>
 
@@ -31,13 +30,11 @@ struct WorkOptions {
   bool require_sandbox = false;
 };
 
-/// What all of the work shares. `blob_gate`: held shared from making a blob until a row refers to it, and alone while
-/// unused blobs are removed.
+/// What all of the work shares.
 struct WorkPlace {
   JobStore& store;
   BlobStore& blobs;
   EventBus& bus;
-  std::shared_mutex& blob_gate;
   WorkCounters& counters;
   const WorkOptions& options;
 };

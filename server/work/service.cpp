@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <shared_mutex>
 #include <thread>
 
 #include "core/base/sha256.h"
@@ -106,7 +105,7 @@ class LocalService final : public Service {
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
   bool may_claim() const { return disk_space(options_.data).free_fraction >= options_.hard_free_fraction; }
-  WorkPlace place() { return {*store_, *blobs_, bus_, blob_gate_, counters_, work_options_}; }
+  WorkPlace place() { return {*store_, *blobs_, bus_, counters_, work_options_}; }
   WorkOptions work_options() const;
 
   const ServiceOptions options_;
@@ -114,7 +113,6 @@ class LocalService final : public Service {
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;
   EventBus bus_;
-  std::shared_mutex blob_gate_;
   WorkCounters counters_;
   const WorkOptions work_options_ = work_options();
   StopSignal plans_stop_;
@@ -130,7 +128,7 @@ class LocalUpload final : public AssetUpload {
   Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
   std::uint64_t bytes() const override { return writer_.bytes(); }
   Result<StoredBlob> finish() override {
-    const std::shared_lock gate(service_->blob_gate_);
+    KILN_TRY(gate, service_->store_->enter_blob_gate());
     KILN_TRY(stored, writer_.finish());
     auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes);
     if (!noted) return tl::make_unexpected(noted.error());
@@ -265,7 +263,8 @@ Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest&
 
 bool LocalService::has_asset(const std::string& sha256) {
   // The row decides: a file without one may be on its way out. Asking keeps the blob for another grace.
-  const std::shared_lock gate(blob_gate_);
+  const auto gate = store_->enter_blob_gate();
+  if (!gate) return false;
   if (!store_->knows_blob(sha256).value_or(false)) return false;
   const auto reader = blobs_->open_blob(sha256);
   return reader && store_->touch_blob(sha256, reader->size()).has_value();

@@ -8,7 +8,15 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/server/jobs/store_conformance.h"
+
 namespace kiln {
+
+namespace testing {
+INSTANTIATE_TEST_SUITE_P(SQLite, StoreConformance, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
+INSTANTIATE_TEST_SUITE_P(SQLite, StoreClaims, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
+}  // namespace testing
+
 namespace {
 
 class SqliteStoreTest : public ::testing::Test {

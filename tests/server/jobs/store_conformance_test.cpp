@@ -1,23 +1,22 @@
 #include "tests/server/jobs/store_conformance.h"
 
 #include <algorithm>
+#include <atomic>
 #include <set>
+#include <thread>
 
 #include "server/jobs/sqlite_store.h"
 
 namespace kiln::testing {
 
-const Engine& sqlite_engine() {
-  static const Engine engine{
-      "sqlite", [](const std::filesystem::path& folder, TestClock& clock) {
-        return open_sqlite_store({folder / "kiln.db", [&clock] { return clock.now_ms; }}).value();
-      }};
-  return engine;
+std::unique_ptr<JobStore> open_sqlite_on(const std::filesystem::path& folder, TestClock& clock) {
+  return open_sqlite_store({folder / "kiln.db", [&clock] { return clock.now_ms; }}).value();
 }
 
 StoreConformance::StoreConformance() {
   std::string name = (std::filesystem::temp_directory_path() / "kiln_store.XXXXXX").string();
   folder_ = ::mkdtemp(name.data());
+  GetParam().empty();
   store_ = GetParam().open(folder_, clock_);
   EXPECT_TRUE(store_->touch_blob(sha('a'), 100));
 }
@@ -256,9 +255,45 @@ TEST_P(StoreConformance, CountsFollowTheStates) {
   EXPECT_EQ(counts.oldest_queued_ms, clock_.now_ms);
 }
 
-}  // namespace
+TEST_P(StoreConformance, TheBlobGateLetsManyInAndThenOneAlone) {
+  auto first = store().enter_blob_gate();
+  auto second = store().enter_blob_gate();
+  EXPECT_TRUE(first && second);
+  first->reset();
+  second->reset();
+  EXPECT_TRUE(store().close_blob_gate());
+  EXPECT_TRUE(store().enter_blob_gate()) << "a gate opens again at the end of its holder";
+}
 
-INSTANTIATE_TEST_SUITE_P(Engines, StoreConformance, ::testing::Values(sqlite_engine()),
-                         [](const auto& param) { return param.param.name; });
+TEST_P(StoreConformance, NobodyMakesABlobWhileOneIsAloneAtTheGate) {
+  auto alone = store().close_blob_gate();
+  ASSERT_TRUE(alone);
+  std::atomic<bool> inside{false};
+  std::thread other([&] {
+    const auto gate = store().enter_blob_gate();
+    inside = gate.has_value();
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // a gate that does not hold lets it in by now
+  EXPECT_FALSE(inside);
+  alone->reset();
+  other.join();
+  EXPECT_TRUE(inside);
+}
+
+TEST_P(StoreConformance, TextsOfAllAlphabetsAndNumbersOfAllSizesComeBack) {
+  NewJob asked = job("Gl\xC3\xBChofen \xE7\xAA\xAF '?$1\\ \"x\"");
+  asked.recipe = R"({"a": "?", "b": "'"})";
+  const std::string id = store().create(asked).value().job.id;
+  const JobProgress progress{"stage", 3'000'000'000'000, 4'000'000'000'000, 1.0 / 3, 0.1};
+  EXPECT_EQ(store().heartbeat(claim().ref, kTestLease, progress), Beat::ok);
+  const Job read = store().get(id).value();
+  EXPECT_EQ(read.label, asked.label);
+  EXPECT_EQ(read.recipe, asked.recipe);
+  EXPECT_EQ(read.progress->done, progress.done);
+  EXPECT_EQ(read.progress->fraction, progress.fraction);
+  EXPECT_EQ(read.progress->eta_s, progress.eta_s);
+}
+
+}  // namespace
 
 }  // namespace kiln::testing
