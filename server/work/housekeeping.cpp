@@ -1,7 +1,6 @@
 #include "server/work/housekeeping.h"
 
 #include <algorithm>
-#include <filesystem>
 
 namespace kiln {
 namespace {
@@ -11,15 +10,14 @@ using Clock = std::chrono::steady_clock;
 constexpr Millis kReapEvery{5000};
 constexpr double kPartialAgeS = 24 * 3600;
 
-/// Files whose row never came to be. Their age is the file's own.
+/// Blobs whose row never came to be. Their age is the blob's own.
 Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
   std::vector<std::string> old;
-  const auto before = std::filesystem::file_time_type::clock::now() - grace;
-  place.blobs.for_each([&](const std::string& sha256, std::uint64_t) {
-    std::error_code gone;
-    const auto written = std::filesystem::last_write_time(place.blobs.path_of(sha256), gone);
-    if (!gone && written < before) old.push_back(sha256);
+  const double grace_s = std::chrono::duration<double>(grace).count();
+  const auto listed = place.blobs.for_each([&](const BlobEntry& blob) {
+    if (blob.age_s > grace_s) old.push_back(blob.sha256);
   });
+  if (!listed) return tl::make_unexpected(listed.error());
   int removed = 0;
   for (const std::string& sha256 : old) {
     KILN_TRY(alone, place.store.close_blob_gate());
@@ -82,6 +80,7 @@ void Housekeeping::tidy(bool collect) {
   if (!collect) return;
   static_cast<void>(collect_unused_blobs(place_, grace_));  // a store that cannot write now: the next round
   place_.blobs.expire_partials(kPartialAgeS);
+  place_.blobs.remove_dead_writers();
 }
 
 }  // namespace kiln

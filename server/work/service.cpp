@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/base/sha256.h"
+#include "server/blobs/file_blobs.h"
 #include "server/jobs/sqlite_store.h"
 #include "server/work/checkpoint_file.h"
 #include "server/work/content_key.h"
@@ -296,7 +297,7 @@ std::vector<std::string> LocalService::unready_reasons() {
   std::vector<std::string> reasons;
   if (bus_.closed()) reasons.emplace_back("the server stops");
   if (const auto writable = store_->check_writable(); !writable) reasons.push_back(writable.error().message);
-  if (const auto probe = blobs_->write(); !probe) reasons.push_back(probe.error().message);
+  if (const auto storing = blobs_->check(); !storing) reasons.push_back(storing.error().message);
   const double free = disk_space(options_.data).free_fraction;
   if (free < options_.hard_free_fraction) {
     reasons.emplace_back("the disk is nearly full: jobs wait");
@@ -311,7 +312,7 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   options.data = std::filesystem::absolute(given.data);
   KILN_TRY(lock, DataLock::take(options.data));
   KILN_TRY(store, open_sqlite_store({options.data / "kiln.db", {}}));
-  KILN_TRY(blobs, BlobStore::open(options.data));
+  KILN_TRY(blobs, open_file_blobs(options.data));
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
   if (!error) std::filesystem::create_directories(options.data / "checkpoints", error);

@@ -4,11 +4,13 @@
 
 #include <stdexcept>
 
+#include "server/blobs/file_blobs.h"
+
 namespace kiln {
 namespace {
 
 std::unique_ptr<BlobStore> open_store(const std::filesystem::path& folder) {
-  auto store = BlobStore::open(folder);
+  auto store = open_file_blobs(folder);
   if (!store) throw std::runtime_error("the test's blob store does not open");
   return std::move(*store);
 }
