@@ -1,4 +1,5 @@
-// kilnd: serves HTTP and supervises its workers. `kilnd bake-worker FOLDER` is such a worker.
+// kilnd: serves HTTP and supervises its workers. `kilnd worker` only does the latter, for a fleet. `kilnd bake-worker
+// FOLDER` is such a worker.
 
 #include <signal.h>
 
@@ -20,8 +21,10 @@ namespace {
 
 int complain(const Fault& fault) {
   std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
-  const bool config = fault.code == "data_in_use" || fault.code == "schema_too_new" || fault.code == "bad_token_file";
-  return config ? kExitConfig : 1;
+  for (const char* config : {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused"}) {
+    if (fault.code == config) return kExitConfig;
+  }
+  return 1;
 }
 
 sigset_t end_signals() {
@@ -51,11 +54,6 @@ Result<HttpOptions> http_options(const DaemonOptions& options) {
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
   if (!options.token_file.empty()) {
-    auto hashes = read_token_hashes(options.token_file);
-    if (!hashes) return tl::make_unexpected(hashes.error());
-    http.token_hashes = std::move(*hashes);
-  }
-  if (!options.token_file.empty()) {
     KILN_TRY(hashes, read_token_hashes(options.token_file));
     http.token_hashes = std::move(hashes);
   }
@@ -76,6 +74,17 @@ bool check_sandbox(bool required) {
   return !required;
 }
 
+/// A worker of a fleet: the service without a door.
+int work(Service& service) {
+  service.start();
+  std::fprintf(stderr, "kilnd works for its fleet\n");
+  const sigset_t ends = end_signals();
+  int received = 0;
+  ::sigwait(&ends, &received);
+  service.drain();
+  return 0;
+}
+
 int serve(const DaemonOptions& options) {
   if (!check_sandbox(options.service.require_sandbox)) return kExitConfig;
   const sigset_t ends = end_signals();
@@ -85,6 +94,7 @@ int serve(const DaemonOptions& options) {
   if (!http) return complain(http.error());
   auto service = Service::open(options.service);
   if (!service) return complain(service.error());
+  if (options.worker_only) return work(**service);
   HttpServer server(*http, **service);
   const auto port = server.bind();
   if (!port) return complain(port.error());

@@ -60,7 +60,8 @@ void Housekeeping::work() {
   const Millis collect_every = std::clamp(grace_ / 20, Millis(1000), Millis(600'000));
   auto collected = Clock::now();
   std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, std::min(kReapEvery, collect_every), [&] { return stopping_; })) {
+  const Millis reap_every = std::min(kReapEvery, place_.options.lease / 4);
+  while (!changed_.wait_for(lock, std::min(reap_every, collect_every), [&] { return stopping_; })) {
     lock.unlock();
     const bool collect = Clock::now() - collected >= collect_every;
     if (collect) collected = Clock::now();

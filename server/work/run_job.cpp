@@ -21,7 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Kind = WorkerOutcome::Kind;
 
-constexpr auto kStoreProgressEvery = std::chrono::seconds(5);
+constexpr Millis kStoreProgressEvery{5000};
 constexpr auto kShowProgressEvery = std::chrono::milliseconds(50);
 constexpr double kPlanWallS = 60;
 
@@ -72,10 +72,14 @@ class Pulse {
 
   void tick() {
     const auto now = Clock::now();
-    if (now - beaten_ < kStoreProgressEvery) return;
-    beaten_ = now;
-    const auto beat = place_.store.heartbeat(claim_.ref, kLease, newest_);
-    if (!beat) return;  // the lease still holds for a while: try again
+    const Millis lease = place_.options.lease;
+    if (now - tried_ < std::min(kStoreProgressEvery, lease / 4)) return;
+    tried_ = now;
+    const auto beat = place_.store.heartbeat(claim_.ref, lease, newest_);
+    // Without an answer the job is given up before the store gives it to another.
+    if (!beat && now - answered_ > lease * 3 / 4) stop_.ask(StopReason::lost);
+    if (!beat) return;
+    answered_ = now;
     if (*beat == Beat::lost) stop_.ask(StopReason::lost);
     if (*beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
   }
@@ -85,14 +89,14 @@ class Pulse {
   StopSignal& stop_;
   const WorkPlace& place_;
   const Clock::time_point started_ = Clock::now();
-  Clock::time_point shown_{}, beaten_ = Clock::now();
+  Clock::time_point shown_{}, tried_ = Clock::now(), answered_ = Clock::now();
   JobProgress newest_;
 };
 
 /// Tries again while the store cannot write, as long as the claim may hold; the queue waits meanwhile.
 template <class Write>
-Result<Wrote> persist(const StopSignal& stop, Write&& write) {
-  const auto deadline = Clock::now() + kLease;
+Result<Wrote> persist(const StopSignal& stop, Millis lease, Write&& write) {
+  const auto deadline = Clock::now() + lease;
   for (Millis pause{100};; pause = std::min(pause * 2, Millis(2000))) {
     Result<Wrote> wrote = write();
     if (wrote || Clock::now() > deadline || stop.asked() == StopReason::drain) return wrote;
@@ -185,20 +189,25 @@ class JobRun {
   }
 
   void succeed(const std::vector<Artifact>& artifacts, bool cached) {
-    if (!wrote(persist(stop_, [&] { return place_.store.commit(claim_.ref, artifacts, cached); }))) return;
+    if (!wrote(
+            persist(stop_, place_.options.lease, [&] { return place_.store.commit(claim_.ref, artifacts, cached); })))
+      return;
     checkpoint_.remove();
     ++place_.counters.succeeded;
     if (cached) ++place_.counters.cached;
   }
 
   void fail(const JobError& error) {
-    if (!wrote(persist(stop_, [&] { return place_.store.fail(claim_.ref, error); }))) return;
+    if (!wrote(persist(stop_, place_.options.lease, [&] { return place_.store.fail(claim_.ref, error); }))) return;
     checkpoint_.remove();
     ++place_.counters.failed;
   }
 
   void after_stop() {
-    if (stop_.asked() == StopReason::lost) return;
+    if (stop_.asked() == StopReason::lost) {
+      ++place_.counters.lost_leases;
+      return;
+    }
     if (stop_.asked() == StopReason::drain) {
       static_cast<void>(wrote(place_.store.release(claim_.ref)));  // else the next start finds and requeues it
     } else {
@@ -222,7 +231,8 @@ class JobRun {
   }
 
   void retry(const Retry& how) {
-    if (wrote(persist(stop_, [&] { return place_.store.retry(claim_.ref, how); }))) ++place_.counters.retried;
+    if (wrote(persist(stop_, place_.options.lease, [&] { return place_.store.retry(claim_.ref, how); })))
+      ++place_.counters.retried;
   }
 
   /// False when nothing was written: canceled meanwhile, fenced off, or the store is out of order.
@@ -233,7 +243,7 @@ class JobRun {
   }
 
   void finish_cancel() {
-    const auto ended = persist(stop_, [&] { return place_.store.finish_cancel(claim_.ref); });
+    const auto ended = persist(stop_, place_.options.lease, [&] { return place_.store.finish_cancel(claim_.ref); });
     if (!ended) return;
     checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);

@@ -5,13 +5,13 @@
 #include <thread>
 
 #include "core/base/sha256.h"
-#include "server/blobs/file_blobs.h"
-#include "server/jobs/sqlite_store.h"
 #include "server/work/checkpoint_file.h"
 #include "server/work/content_key.h"
 #include "server/work/data_folder.h"
 #include "server/work/event_stream.h"
 #include "server/work/housekeeping.h"
+#include "server/work/neighbours.h"
+#include "server/work/sandbox.h"
 #include "server/work/supervisor.h"
 #include "server/work/work_folder.h"
 
@@ -71,6 +71,7 @@ class LocalService final : public Service {
   void start() override {
     supervisor_.start();
     housekeeping_.start();
+    neighbours_.start();
   }
   void drain() override;
 
@@ -98,14 +99,15 @@ class LocalService final : public Service {
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
 
   ServiceStats stats() override;
-  std::vector<std::string> unready_reasons() override;
+  std::vector<Check> checks() override;
 
  private:
   friend class LocalUpload;
   template <class Condition>
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
-  bool may_claim() const { return disk_space(options_.data).free_fraction >= options_.hard_free_fraction; }
+  bool may_claim() const { return disk().free_fraction >= options_.hard_free_fraction; }
+  DiskSpace disk() const;
   WorkPlace place() { return {*store_, *blobs_, bus_, counters_, work_options_}; }
   WorkOptions work_options() const;
 
@@ -120,6 +122,7 @@ class LocalService final : public Service {
   std::atomic<int> plans_{0};
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), options_.blob_grace};
+  Neighbours neighbours_{place(), supervisor_};
 };
 
 class LocalUpload final : public AssetUpload {
@@ -145,12 +148,13 @@ class LocalUpload final : public AssetUpload {
 WorkOptions LocalService::work_options() const {
   const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
-  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads,
-          options_.first_retry,   options_.require_sandbox};
+  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads, options_.first_retry,
+          options_.lease,         options_.require_sandbox};
 }
 
 void LocalService::drain() {
   bus_.close();
+  neighbours_.stop();
   plans_stop_.ask(StopReason::drain);
   supervisor_.stop();
   housekeeping_.stop();
@@ -254,8 +258,8 @@ Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const st
 
 Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
   if (bus_.closed()) return draining();
-  const DiskSpace disk = disk_space(options_.data);
-  if (disk.free_fraction < options_.soft_free_fraction || disk.free_bytes < request.expected) {
+  const DiskSpace room = disk();
+  if (room.free_fraction < options_.soft_free_fraction || room.free_bytes < request.expected) {
     return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
   }
   KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
@@ -281,38 +285,55 @@ ServiceStats LocalService::stats() {
   stats.cached = counters_.cached;
   stats.retried = counters_.retried;
   stats.reaped = counters_.reaped;
+  stats.lost_leases = counters_.lost_leases;
   stats.stale_commits = counters_.stale_commits;
   stats.deaths_signal = counters_.deaths_signal;
   stats.deaths_memory = counters_.deaths_memory;
   stats.deaths_timeout = counters_.deaths_timeout;
   stats.bytes_uploaded = counters_.bytes_uploaded;
   stats.claim_latency_s_sum = static_cast<double>(counters_.claim_latency_ms) / 1000;
-  const DiskSpace disk = disk_space(options_.data);
-  stats.free_fraction = disk.free_fraction;
-  stats.free_bytes = disk.free_bytes;
+  const DiskSpace room = disk();
+  stats.free_fraction = room.free_fraction;
+  stats.free_bytes = room.free_bytes;
   return stats;
 }
 
-std::vector<std::string> LocalService::unready_reasons() {
-  std::vector<std::string> reasons;
-  if (bus_.closed()) reasons.emplace_back("the server stops");
-  if (const auto writable = store_->check_writable(); !writable) reasons.push_back(writable.error().message);
-  if (const auto storing = blobs_->check(); !storing) reasons.push_back(storing.error().message);
-  const double free = disk_space(options_.data).free_fraction;
+/// The fuller of the two disks: that of the workers, and that of the blobs where it is another.
+DiskSpace LocalService::disk() const {
+  const DiskSpace work = disk_space(options_.data), blobs = disk_space(blobs_->folder());
+  return work.free_fraction < blobs.free_fraction ? work : blobs;
+}
+
+std::vector<Check> LocalService::checks() {
+  const auto check = [](const char* name, const Result<void>& works) {
+    return Check{name, works.has_value(), works ? "ok" : works.error().message};
+  };
+  std::vector<Check> all{check("store", store_->check_writable()), check("blobs", blobs_->check())};
+  const double free = disk().free_fraction;
   if (free < options_.hard_free_fraction) {
-    reasons.emplace_back("the disk is nearly full: jobs wait");
+    all.push_back({"disk", false, "the disk is nearly full: jobs wait"});
   } else if (free < options_.soft_free_fraction) {
-    reasons.emplace_back("the disk is nearly full: uploads are refused");
+    all.push_back({"disk", false, "the disk is nearly full: uploads are refused"});
+  } else {
+    all.push_back({"disk", true, "ok"});
   }
-  return reasons;
+  const Sandbox sandbox = sandbox_support();
+  const char* locks = sandbox.whole() ? "files and calls"
+                      : sandbox.files ? "files only"
+                      : sandbox.calls ? "calls only"
+                                      : "none";
+  all.push_back({"sandbox", sandbox.whole() || !options_.require_sandbox, locks});
+  if (bus_.closed()) all.push_back({"drain", false, "the server stops"});
+  return all;
 }
 
 Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   ServiceOptions options = given;
   options.data = std::filesystem::absolute(given.data);
+  if (auto sound = check_addresses(options.stores); !sound) return tl::make_unexpected(sound.error());
   KILN_TRY(lock, DataLock::take(options.data));
-  KILN_TRY(store, open_sqlite_store({options.data / "kiln.db", {}}));
-  KILN_TRY(blobs, open_file_blobs(options.data));
+  KILN_TRY(store, open_job_store(options.stores, options.data));
+  KILN_TRY(blobs, open_blob_store(options.stores, options.data));
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
   if (!error) std::filesystem::create_directories(options.data / "checkpoints", error);
@@ -320,8 +341,10 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   // What an earlier server left behind: its workers died with it.
   remove_work_folders(options.data / "work");
   blobs->remove_dead_writers();
-  KILN_TRY(requeued, store->reap(true));
-  static_cast<void>(requeued);
+  if (!store->shared()) {
+    KILN_TRY(requeued, store->reap(true));
+    static_cast<void>(requeued);
+  }
   remove_stale_checkpoints(options.data / "checkpoints", *store);
   return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
 }

@@ -20,11 +20,13 @@
 #include "core/bake/recipe.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/work/stores.h"
 
 namespace kiln {
 
 struct ServiceOptions {
-  std::filesystem::path data;               // holds kiln.db, cas/, tmp/, work/ and lock
+  std::filesystem::path data;               // of this server alone: work/, checkpoints/, lock; kiln.db, cas/, tmp/
+  StoreOptions stores;                      // where jobs and blobs live when not in `data`
   int workers = 1;                          // jobs at a time, each in a process of its own; 0: bake nothing
   int threads = 0;                          // of one worker when its recipe does not say; 0: hardware threads / workers
   std::vector<std::string> worker_command;  // empty: this very program with "bake-worker"
@@ -32,6 +34,7 @@ struct ServiceOptions {
   double soft_free_fraction = 0.10;  // below: uploads are refused with disk_full
   double hard_free_fraction = 0.05;  // below: nothing is claimed, the queue waits
   Millis blob_grace{24 * 3600 * 1000};
+  Millis lease{60'000};          // a job whose server says nothing for so long is given to another
   Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
   bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
 };
@@ -80,7 +83,7 @@ class EventStream {
 struct ServiceStats {
   StoreCounts jobs;
   std::uint64_t claimed = 0, succeeded = 0, failed = 0, canceled = 0, cached = 0;  // since start
-  std::uint64_t retried = 0, reaped = 0, stale_commits = 0;
+  std::uint64_t retried = 0, reaped = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;
   double claim_latency_s_sum = 0;  // created to claimed, over `claimed`
@@ -88,9 +91,17 @@ struct ServiceStats {
   std::uint64_t free_bytes = 0;
 };
 
+/// One thing that serving needs.
+struct Check {
+  std::string name;  // store, blobs, disk, sandbox, drain
+  bool ready = true;
+  std::string state;  // a sentence when not ready, else a word or two
+};
+
 class Service {
  public:
   /// Takes the lock ("data_in_use" when another server has it), recovers what an earlier one left, starts nothing yet.
+  /// In a fleet the running jobs of others stay theirs: only the end of a lease gives them back.
   static Result<std::unique_ptr<Service>> open(const ServiceOptions&);
   virtual ~Service() = default;
 
@@ -126,8 +137,8 @@ class Service {
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;
 
   virtual ServiceStats stats() = 0;
-  /// Why the service cannot take work, each a sentence; empty when it is ready.
-  virtual std::vector<std::string> unready_reasons() = 0;
+  /// Whether the service can take work, thing by thing.
+  virtual std::vector<Check> checks() = 0;
 };
 
 }  // namespace kiln

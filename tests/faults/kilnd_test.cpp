@@ -71,6 +71,28 @@ TEST_F(KilndTest, ASecondServerOnTheSameDataIsRefused) {
   EXPECT_NE(end.text.find("another server"), std::string::npos) << end.text;
 }
 
+TEST_F(KilndTest, AddressesOfAFleetThatMeanNothingAreRefusedInOneLine) {
+  for (const char* arguments :
+       {"--store mysql://db/kiln --blobs dir:/tmp", "--store postgresql://kiln@db/kiln", "--blobs dir:relative",
+        "--blobs s3://bucket", "--blobs ftp://host", "worker",
+        "--blobs s3://bucket --s3-endpoint http://user:secret@host", "--s3-endpoint http://host --blobs s3://a/b"}) {
+    const End end = refuse(arguments);
+    EXPECT_EQ(end.code, 78) << arguments << end.text;
+    EXPECT_EQ(std::ranges::count(end.text, '\n'), 1) << end.text;
+  }
+}
+
+TEST_F(KilndTest, APasswordOnTheCommandLineIsRefusedAndNotRepeated) {
+  const End end = refuse("--blobs dir:/tmp --store postgresql://kiln:hunter2@127.0.0.1:1/kiln");
+  EXPECT_EQ(end.code, 78);
+  EXPECT_EQ(end.text.find("hunter2"), std::string::npos) << end.text;
+  ::setenv("KILN_STORE", "postgresql://kiln:hunter2@127.0.0.1:1/kiln", 1);
+  const End from_environment = refuse("--blobs dir:/tmp");
+  ::unsetenv("KILN_STORE");
+  EXPECT_EQ(from_environment.code, 1) << "the address is taken, and nobody answers there: " << from_environment.text;
+  EXPECT_EQ(from_environment.text.find("hunter2"), std::string::npos);
+}
+
 TEST_F(KilndTest, AnUnknownFlagIsAUsageError) { EXPECT_EQ(refuse("--no-such-flag").code, 2); }
 
 TEST_F(KilndTest, TermEndsAnIdleServerWithZero) {

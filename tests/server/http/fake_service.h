@@ -43,7 +43,7 @@ class FakeService : public Service {
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
   ServiceStats stats() override { return {}; }
-  std::vector<std::string> unready_reasons() override;
+  std::vector<Check> checks() override;
 
  private:
   friend class FakeStream;
@@ -59,7 +59,7 @@ class FakeService : public Service {
   std::map<std::string, Job> jobs_;
   std::map<std::string, std::string> keys_;  // idempotency key -> job
   std::vector<JobEvent> events_;
-  std::vector<std::string> unready_;
+  std::vector<Check> checks_;
   std::optional<Fault> submit_fault_;
   std::string list_exception_;
   Submission last_;

@@ -208,11 +208,11 @@ TEST_F(ServiceTest, ANearlyFullDiskRefusesUploadsAndLetsTheQueueWait) {
   EXPECT_EQ(service_->put_asset({}).error().code, "disk_full");
   const std::string id = service_->submit(job)->job.id;
   EXPECT_EQ(service_->wait_done(id, 500ms)->state, JobState::queued);
-  EXPECT_EQ(service_->unready_reasons(), (std::vector<std::string>{"the disk is nearly full: jobs wait"}));
+  EXPECT_EQ(unready(), (std::vector<std::string>{"the disk is nearly full: jobs wait"}));
   options_.soft_free_fraction = options_.hard_free_fraction = 0;
   start();
   EXPECT_EQ(service_->wait_done(id, 20s)->state, JobState::succeeded);
-  EXPECT_TRUE(service_->unready_reasons().empty());
+  EXPECT_TRUE(unready().empty());
 }
 
 TEST_F(ServiceTest, AnUnusedAssetIsCollectedAndAUsedOneIsNot) {
