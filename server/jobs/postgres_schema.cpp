@@ -18,6 +18,7 @@ INSERT INTO meta VALUES(1);
 CREATE TABLE job(
   id word PRIMARY KEY CHECK(length(id) = 26),
   state word NOT NULL CHECK(state IN ('queued', 'running', 'succeeded', 'failed', 'canceled')),
+  tenant word NOT NULL,
   label word NOT NULL,
   recipe word NOT NULL,
   content_key word NOT NULL,
@@ -47,14 +48,22 @@ CREATE TABLE job(
 CREATE INDEX job_by_age ON job(created_at, id);
 CREATE INDEX job_by_state ON job(state, created_at, id);
 CREATE INDEX job_by_label ON job(label, created_at, id);
+CREATE INDEX job_by_tenant ON job(tenant, created_at, id);
 CREATE INDEX job_queued ON job(id) WHERE state = 'queued';
-CREATE INDEX job_running ON job(id) WHERE state = 'running';
+CREATE INDEX job_running ON job(tenant) WHERE state = 'running';
 CREATE INDEX job_by_content ON job(content_key, finished_at) WHERE finished_at IS NOT NULL;
 
 CREATE TABLE blob(
   sha256 word PRIMARY KEY CHECK(length(sha256) = 64),
   bytes BIGINT NOT NULL CHECK(bytes >= 0),
   last_ref_at BIGINT NOT NULL
+);
+
+-- Who brought the blob or baked it: others cannot tell that it is there.
+CREATE TABLE blob_tenant(
+  sha256 word NOT NULL REFERENCES blob(sha256) ON DELETE CASCADE,
+  tenant word NOT NULL,
+  PRIMARY KEY(sha256, tenant)
 );
 
 CREATE TABLE job_input(

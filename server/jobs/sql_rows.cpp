@@ -50,7 +50,8 @@ Result<void> insert_input(Connection& db, const Job& job, const char* role, cons
 }  // namespace
 
 const char* const kJobColumns =
-    "id, state, label, recipe, content_key, force, cached, cancel_requested_at, attempt, crashes, retries, created_at, "
+    "id, state, tenant, label, recipe, content_key, force, cached, cancel_requested_at, attempt, crashes, retries, "
+    "created_at, "
     "started_at, finished_at, version, stage, done, total, fraction, eta_s, error_code, error_message, error_where, "
     "error_status";
 
@@ -58,21 +59,22 @@ Job read_job(const Row& row) {
   Job job;
   job.id = row.text(0);
   job.state = parse_job_state(row.text(1)).value_or(JobState::failed);  // a CHECK keeps other words out
-  job.label = row.text(2);
-  job.recipe = row.text(3);
-  job.content_key = row.text(4);
-  job.force = row.integer(5) != 0;
-  job.cached = row.integer(6) != 0;
-  job.cancel_requested = !row.is_null(7);
-  job.attempt = static_cast<int>(row.integer(8));
-  job.crashes = static_cast<int>(row.integer(9));
-  job.retries = static_cast<int>(row.integer(10));
-  job.created_ms = row.integer(11);
-  job.started_ms = row.integer(12);
-  job.finished_ms = row.integer(13);
-  job.version = static_cast<std::uint64_t>(row.integer(14));
-  if (job.state == JobState::running) job.progress = read_progress(row, 15);
-  job.error = read_error(row, 20);
+  job.tenant = row.text(2);
+  job.label = row.text(3);
+  job.recipe = row.text(4);
+  job.content_key = row.text(5);
+  job.force = row.integer(6) != 0;
+  job.cached = row.integer(7) != 0;
+  job.cancel_requested = !row.is_null(8);
+  job.attempt = static_cast<int>(row.integer(9));
+  job.crashes = static_cast<int>(row.integer(10));
+  job.retries = static_cast<int>(row.integer(11));
+  job.created_ms = row.integer(12);
+  job.started_ms = row.integer(13);
+  job.finished_ms = row.integer(14);
+  job.version = static_cast<std::uint64_t>(row.integer(15));
+  if (job.state == JobState::running) job.progress = read_progress(row, 16);
+  job.error = read_error(row, 21);
   return job;
 }
 

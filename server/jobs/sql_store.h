@@ -40,8 +40,8 @@ class SqlStore final : public JobStore {
   Result<std::uint64_t> last_event_id() override;
 
   Result<void> log(const std::string& job_id, const std::string& line) override;
-  Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes) override;
-  Result<bool> knows_blob(const std::string& sha256) override;
+  Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) override;
+  Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) override;
   Result<std::vector<std::string>> forget_unused_blobs(Millis grace) override;
   Result<void> check_writable() override;
 
@@ -85,7 +85,12 @@ class SqlStore final : public JobStore {
 Result<std::vector<Artifact>> find_result_in(Connection&, const std::string& content_key);
 /// The events that tell of a success.
 Result<void> append_success(Connection&, const std::string& job_id, std::span<const Artifact>, std::int64_t now_ms);
-/// The blob exists and was referred to now.
-Result<void> note_blob(Connection&, const std::string& sha256, std::uint64_t bytes, std::int64_t now_ms);
+/// The blob exists, the tenant has it, and it was referred to now.
+struct BlobNote {
+  std::string sha256;
+  std::uint64_t bytes = 0;
+  std::string tenant;
+};
+Result<void> note_blob(Connection&, const BlobNote&, std::int64_t now_ms);
 
 }  // namespace kiln::sql

@@ -27,8 +27,10 @@ Result<std::optional<Claim>> SqlStore::claim(Millis lease) {
            }));
   if (!due) return std::nullopt;
   return write([&](Connection& db, std::int64_t now) -> Result<std::optional<Claim>> {
-    const std::string oldest = "SELECT id FROM job WHERE state='queued' AND run_after<=? ORDER BY id LIMIT 1";
-    KILN_TRY(rows, db.query(oldest + engine_->keep_rows(true), now));
+    const std::string next =
+        "SELECT id FROM job WHERE state='queued' AND run_after<=? ORDER BY (SELECT count(*) FROM job other "
+        "WHERE other.state='running' AND other.tenant=job.tenant), id LIMIT 1";
+    KILN_TRY(rows, db.query(next + engine_->keep_rows(true), now));
     if (rows.empty()) return std::nullopt;
     KILN_TRY(fence, db.query("UPDATE counter SET value=value+1 WHERE name='fence' RETURNING value"));
     Claim claim;
@@ -80,7 +82,9 @@ Result<Wrote> SqlStore::commit(const ClaimRef& ref, std::span<const Artifact> ar
     }
     std::map<std::string, std::uint64_t> sorted;  // in one order, so that two commits never wait for each other
     for (const Artifact& artifact : artifacts) sorted[artifact.sha256] = artifact.bytes;
-    for (const auto& [sha256, bytes] : sorted) KILN_DO(note_blob(db, sha256, bytes, now));
+    KILN_TRY(owner, db.query("SELECT tenant FROM job WHERE id=?", ref.job_id));
+    const std::string tenant = owner.front().text(0);
+    for (const auto& [sha256, bytes] : sorted) KILN_DO(note_blob(db, {sha256, bytes, tenant}, now));
     KILN_DO(insert_artifacts(db, ref.job_id, artifacts, ref.fence));
     KILN_DO(append_success(db, ref.job_id, artifacts, now));
     return Wrote::done;

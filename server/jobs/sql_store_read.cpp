@@ -34,6 +34,7 @@ Result<Rows> query_page(Connection& db, const JobQuery& query, int limit) {
     statement += condition;
     values.push_back(value_of(value));
   };
+  if (query.tenant) add(" AND tenant=?", *query.tenant);
   if (query.state) add(" AND state=?", to_string(*query.state));
   if (query.label) add(" AND label=?", *query.label);
   if (!query.cursor.empty()) {
@@ -169,19 +170,21 @@ Result<void> SqlStore::log(const std::string& job_id, const std::string& line) {
   });
 }
 
-Result<void> note_blob(Connection& db, const std::string& sha256, std::uint64_t bytes, std::int64_t now) {
+Result<void> note_blob(Connection& db, const BlobNote& blob, std::int64_t now) {
   KILN_DO(db.run("INSERT INTO blob VALUES(?,?,?) ON CONFLICT(sha256) DO UPDATE SET last_ref_at=excluded.last_ref_at",
-                 sha256, bytes, now));
+                 blob.sha256, blob.bytes, now));
+  KILN_DO(db.run("INSERT INTO blob_tenant VALUES(?,?) ON CONFLICT DO NOTHING", blob.sha256, blob.tenant));
   return {};
 }
 
-Result<void> SqlStore::touch_blob(const std::string& sha256, std::uint64_t bytes) {
-  return write([&](Connection& db, std::int64_t now) { return note_blob(db, sha256, bytes, now); });
+Result<void> SqlStore::touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) {
+  return write([&](Connection& db, std::int64_t now) { return note_blob(db, {sha256, bytes, tenant}, now); });
 }
 
-Result<bool> SqlStore::knows_blob(const std::string& sha256) {
+Result<bool> SqlStore::knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) {
   return read([&](Connection& db) -> Result<bool> {
-    KILN_TRY(rows, db.query("SELECT 1 FROM blob WHERE sha256=?", sha256));
+    KILN_TRY(rows, tenant ? db.query("SELECT 1 FROM blob_tenant WHERE sha256=? AND tenant=?", sha256, *tenant)
+                          : db.query("SELECT 1 FROM blob WHERE sha256=?", sha256));
     return !rows.empty();
   });
 }

@@ -92,6 +92,21 @@ CREATE TRIGGER job_event_is_append_only BEFORE UPDATE ON job_event
   BEGIN SELECT RAISE(ABORT, 'events are append-only'); END;
 )sql";
 
+// From version 1 to 2: tenants. What was there belongs to the one without a name.
+constexpr const char* kTenants = R"sql(
+ALTER TABLE job ADD COLUMN tenant TEXT NOT NULL DEFAULT '';
+CREATE INDEX job_by_tenant ON job(tenant, created_at, id);
+DROP INDEX job_running;
+CREATE INDEX job_running ON job(tenant) WHERE state = 'running';
+-- Who brought the blob or baked it: others cannot tell that it is there.
+CREATE TABLE blob_tenant(
+  sha256 TEXT NOT NULL REFERENCES blob(sha256) ON DELETE CASCADE,
+  tenant TEXT NOT NULL,
+  PRIMARY KEY(sha256, tenant)
+) STRICT;
+INSERT INTO blob_tenant SELECT sha256, '' FROM blob;
+)sql";
+
 struct Setting {
   const char* set;
   const char* read;
@@ -153,8 +168,9 @@ Result<void> refuse_network_files(const std::filesystem::path& file) {
 Result<void> make_tables(SqliteConnection& db) {
   KILN_TRY(transaction, Transaction::begin(db));
   KILN_TRY(version, single_value(db, "PRAGMA user_version"));
-  if (version == "0") {
-    KILN_DO(db.execute(kTables));
+  if (version == "0") KILN_DO(db.execute(kTables));
+  if (version == "0" || version == "1") {
+    KILN_DO(db.execute(kTenants));
     KILN_DO(db.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion)));
   } else if (version != std::to_string(kSchemaVersion)) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +

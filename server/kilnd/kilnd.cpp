@@ -54,8 +54,8 @@ Result<HttpOptions> http_options(const DaemonOptions& options) {
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
   if (!options.token_file.empty()) {
-    KILN_TRY(hashes, read_token_hashes(options.token_file));
-    http.token_hashes = std::move(hashes);
+    KILN_TRY(tokens, read_tokens(options.token_file));
+    http.tokens = std::move(tokens);
   }
   return http;
 }

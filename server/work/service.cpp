@@ -94,7 +94,7 @@ class LocalService final : public Service {
 
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
-  bool has_asset(const std::string& sha256) override;
+  bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
 
@@ -127,14 +127,15 @@ class LocalService final : public Service {
 
 class LocalUpload final : public AssetUpload {
  public:
-  LocalUpload(LocalService& service, BlobWriter writer) : service_(&service), writer_(std::move(writer)) {}
+  LocalUpload(LocalService& service, BlobWriter writer, std::string tenant)
+      : service_(&service), writer_(std::move(writer)), tenant_(std::move(tenant)) {}
 
   Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
   std::uint64_t bytes() const override { return writer_.bytes(); }
   Result<StoredBlob> finish() override {
     KILN_TRY(gate, service_->store_->enter_blob_gate());
     KILN_TRY(stored, writer_.finish());
-    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes);
+    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes, tenant_);
     if (!noted) return tl::make_unexpected(noted.error());
     service_->counters_.bytes_uploaded += stored.bytes;
     return stored;
@@ -143,6 +144,7 @@ class LocalUpload final : public AssetUpload {
  private:
   LocalService* service_;
   BlobWriter writer_;
+  std::string tenant_;
 };
 
 WorkOptions LocalService::work_options() const {
@@ -165,9 +167,11 @@ Result<Created> LocalService::submit(const Submission& submission) {
   if (bus_.closed()) return draining();
   KILN_TRY(inputs, inputs_of(submission));
   NewJob job;
+  job.tenant = submission.tenant;
+  job.max_open = submission.max_open;
   job.label = submission.recipe.label;
   job.recipe = recipe_json(submission.recipe);
-  job.content_key = content_key(inputs, submission.recipe);
+  job.content_key = content_key(submission.tenant, inputs, submission.recipe);
   job.inputs = std::move(inputs);
   job.force = submission.force;
   job.idempotency_key = submission.idempotency_key;
@@ -190,7 +194,8 @@ Result<std::string> LocalService::plan(const Submission& submission) {
   if (place_among.others >= kPlansAtOnce)
     return fault("plan_busy", "other plans are being made; try again in a moment");
   for (const NamedBlob& file : all_files(inputs)) {
-    if (!has_asset(file.sha256)) return fault("asset_not_found", "no asset has this SHA-256", file.sha256);
+    if (!has_asset(file.sha256, submission.tenant))
+      return fault("asset_not_found", "no asset has this SHA-256", file.sha256);
   }
   return run_plan(inputs, recipe_json(submission.recipe), plans_stop_, place());
 }
@@ -263,16 +268,16 @@ Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest&
     return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
   }
   KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
-  return std::make_unique<LocalUpload>(*this, std::move(writer));
+  return std::make_unique<LocalUpload>(*this, std::move(writer), request.tenant);
 }
 
-bool LocalService::has_asset(const std::string& sha256) {
+bool LocalService::has_asset(const std::string& sha256, const std::optional<std::string>& tenant) {
   // The row decides: a file without one may be on its way out. Asking keeps the blob for another grace.
   const auto gate = store_->enter_blob_gate();
   if (!gate) return false;
-  if (!store_->knows_blob(sha256).value_or(false)) return false;
+  if (!store_->knows_blob(sha256, tenant).value_or(false)) return false;
   const auto reader = blobs_->open_blob(sha256);
-  return reader && store_->touch_blob(sha256, reader->size()).has_value();
+  return reader && store_->touch_blob(sha256, reader->size(), tenant.value_or("")).has_value();
 }
 
 ServiceStats LocalService::stats() {

@@ -4,7 +4,7 @@
 // Fault codes and the status a front gives them:
 //   400 bad_cursor            404 not_found                 409 upload_busy, offset_mismatch, not_terminal
 //   422 asset_not_found, idempotency_mismatch, hash_mismatch, poisoned, and every fault of an input (plan, jobs)
-//   429 queue_full, plan_busy      503 draining             507 disk_full          500 store_failed, io_failed,
+//   429 queue_full, quota, plan_busy      503 draining             507 disk_full          500 store_failed, io_failed,
 //   internal
 // Every function may be called from any thread. Those with a timeout block their caller for at most that long.
 
@@ -41,6 +41,8 @@ struct ServiceOptions {
 
 /// A job or plan to be. All files are blobs already (put_asset).
 struct Submission {
+  std::string tenant;                    // whose the job is to be
+  int max_open = 0;                      // unfinished jobs that the tenant may have; 0: no limit
   std::string scene_name = "scene.glb";  // for error places
   std::string scene_sha256;              // empty: recipe.scene_asset
   std::vector<NamedBlob> resources;      // by URI as the .gltf writes it, percent-decoded
@@ -68,6 +70,7 @@ struct AssetRequest {
   std::string sha256;          // what the bytes must hash to; empty: not known
   std::uint64_t offset = 0;    // resume here, see asset_offset(); needs sha256
   std::uint64_t expected = 0;  // bytes to come if known: refused at once when the disk cannot take them
+  std::string tenant;          // who brings it
 };
 
 /// Events of one job or of all: first those the store kept, then as they happen. Never skips a durable one.
@@ -131,7 +134,8 @@ class Service {
 
   virtual Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) = 0;
   virtual Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) = 0;
-  virtual bool has_asset(const std::string& sha256) = 0;
+  /// Whether the tenant has it; without one: whether anybody has.
+  virtual bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) = 0;
   /// Where an interrupted upload of `sha256` goes on.
   virtual std::uint64_t asset_offset(const std::string& sha256) = 0;
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;

@@ -39,7 +39,9 @@ class FakeService : public Service {
                                                  std::optional<std::uint64_t> after) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
-  bool has_asset(const std::string& sha256) override { return blobs().exists(sha256); }
+  bool has_asset(const std::string& sha256, const std::optional<std::string>&) override {
+    return blobs().exists(sha256);
+  }
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
   ServiceStats stats() override { return {}; }

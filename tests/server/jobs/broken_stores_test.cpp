@@ -21,6 +21,7 @@ enum class Flaw {
   pages_start_over,  // cursors are not looked at
   events_repeat,     // positions are not looked at
   open_gate,         // nobody is ever alone at the blob gate
+  open_doors,        // a tenant sees the blobs of others
   deaf_cancels       // a running job is not told that it was canceled
 };
 
@@ -71,10 +72,12 @@ class BrokenStore final : public JobStore {
   }
   Result<std::uint64_t> last_event_id() override { return store_->last_event_id(); }
   Result<void> log(const std::string& id, const std::string& line) override { return store_->log(id, line); }
-  Result<void> touch_blob(const std::string& sha, std::uint64_t bytes) override {
-    return store_->touch_blob(sha, bytes);
+  Result<void> touch_blob(const std::string& sha, std::uint64_t bytes, const std::string& tenant) override {
+    return store_->touch_blob(sha, bytes, tenant);
   }
-  Result<bool> knows_blob(const std::string& sha) override { return store_->knows_blob(sha); }
+  Result<bool> knows_blob(const std::string& sha, const std::optional<std::string>& tenant) override {
+    return store_->knows_blob(sha, flaw_ == Flaw::open_doors ? std::nullopt : tenant);
+  }
   Result<std::vector<std::string>> forget_unused_blobs(Millis grace) override {
     return store_->forget_unused_blobs(grace);
   }
@@ -109,6 +112,7 @@ std::vector<Engine> engines() {
           broken("pages_start_over", Flaw::pages_start_over),
           broken("events_repeat", Flaw::events_repeat),
           broken("open_gate", Flaw::open_gate),
+          broken("open_doors", Flaw::open_doors),
           broken("deaf_cancels", Flaw::deaf_cancels)};
 }
 

@@ -60,6 +60,23 @@ TEST_F(SqliteStoreTest, ADatabaseOfANewerProgramIsRefused) {
   EXPECT_EQ(open_sqlite_store({file(), {}}).error().code, "schema_too_new");
 }
 
+TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
+  std::string id;
+  {
+    const auto store = open_sqlite_store({file(), {}}).value();
+    id = finished_job(*store).id;
+  }
+  // Back to how version 1 was.
+  ASSERT_EQ(run("DROP TABLE blob_tenant; DROP INDEX job_by_tenant; DROP INDEX job_running;"
+                "ALTER TABLE job DROP COLUMN tenant; CREATE INDEX job_running ON job(id) WHERE state='running';"
+                "PRAGMA user_version=1"),
+            SQLITE_OK);
+  const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_EQ(store->get(id)->state, JobState::canceled);
+  EXPECT_EQ(store->get(id)->tenant, "");
+  EXPECT_TRUE(store->knows_blob(std::string(64, 'a'), "").value());
+}
+
 TEST_F(SqliteStoreTest, AFileThatIsNoDatabaseIsRefused) {
   std::ofstream(file()) << std::string(8192, 'x');
   EXPECT_FALSE(open_sqlite_store({file(), {}}));

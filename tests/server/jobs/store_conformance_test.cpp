@@ -255,6 +255,59 @@ TEST_P(StoreConformance, CountsFollowTheStates) {
   EXPECT_EQ(counts.oldest_queued_ms, clock_.now_ms);
 }
 
+TEST_P(StoreConformance, ATenantsAssetsKeysAndListAreItsOwn) {
+  NewJob ours = job("ours", "key a"), theirs = job("theirs", "key b");
+  ours.tenant = "a";
+  theirs.tenant = "b";
+  ours.idempotency_key = theirs.idempotency_key = "once";
+  EXPECT_EQ(store().create(ours).error().code, "asset_not_found") << "the scene is nobody's of a";
+  EXPECT_TRUE(store().touch_blob(sha('a'), 100, "a"));
+  EXPECT_TRUE(store().knows_blob(sha('a'), "a").value());
+  EXPECT_FALSE(store().knows_blob(sha('a'), "b").value());
+  EXPECT_TRUE(store().knows_blob(sha('a')).value());
+  EXPECT_TRUE(store().touch_blob(sha('a'), 100, "b"));
+  const std::string id = store().create(ours).value().job.id;
+  EXPECT_FALSE(store().create(theirs).value().existed) << "the same key of another tenant is another key";
+  EXPECT_TRUE(store().create(ours).value().existed);
+  EXPECT_EQ(store().get(id)->tenant, "a");
+  JobQuery query;
+  query.tenant = "a";
+  ASSERT_EQ(store().list(query)->jobs.size(), 1U);
+  EXPECT_EQ(store().list(query)->jobs[0].id, id);
+  store().commit(claim().ref, std::vector{artifact()}, false).value();
+  EXPECT_TRUE(store().knows_blob(sha('e'), "a").value()) << "what a tenant baked is its own";
+  EXPECT_FALSE(store().knows_blob(sha('e'), "b").value());
+}
+
+TEST_P(StoreConformance, ATenantHasSoManyUnfinishedJobsAndAnotherIsNotHeldUp) {
+  for (const char* tenant : {"a", "b"}) EXPECT_TRUE(store().touch_blob(sha('a'), 100, tenant));
+  const auto submit = [&](const std::string& tenant) {
+    NewJob asked = job();
+    asked.tenant = tenant;
+    asked.max_open = 2;
+    return store().create(asked);
+  };
+  EXPECT_TRUE(submit("a"));
+  claim();  // a running job counts as well
+  EXPECT_TRUE(submit("a"));
+  EXPECT_EQ(submit("a").error().code, "quota");
+  EXPECT_TRUE(submit("b"));
+}
+
+TEST_P(StoreConformance, TheTenantWithTheFewestRunningJobsIsNext) {
+  for (const char* tenant : {"a", "b"}) EXPECT_TRUE(store().touch_blob(sha('a'), 100, tenant));
+  const auto submit = [&](const std::string& tenant) {
+    NewJob asked = job();
+    asked.tenant = tenant;
+    EXPECT_TRUE(store().create(asked));
+  };
+  for (int i = 0; i < 3; ++i) submit("a");
+  for (int i = 0; i < 2; ++i) submit("b");
+  std::string order;
+  for (int i = 0; i < 5; ++i) order += claim().job.tenant;
+  EXPECT_EQ(order, "ababa");
+}
+
 TEST_P(StoreConformance, TheBlobGateLetsManyInAndThenOneAlone) {
   auto first = store().enter_blob_gate();
   auto second = store().enter_blob_gate();

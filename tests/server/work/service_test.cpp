@@ -223,10 +223,10 @@ TEST_F(ServiceTest, AnUnusedAssetIsCollectedAndAUsedOneIsNot) {
   for (int i = 0; i < 100 && std::filesystem::exists(options_.data / "cas" / unused.substr(0, 2) / unused); ++i) {
     std::this_thread::sleep_for(50ms);
   }
-  EXPECT_FALSE(service_->has_asset(unused));
+  EXPECT_FALSE(service_->has_asset(unused, {}));
   EXPECT_FALSE(std::filesystem::exists(options_.data / "cas" / unused.substr(0, 2) / unused));
   EXPECT_TRUE(service_->open_artifact(job.id, "scene.glb"));
-  EXPECT_TRUE(service_->has_asset(job.inputs.scene.sha256));
+  EXPECT_TRUE(service_->has_asset(job.inputs.scene.sha256, {}));
 }
 
 TEST_F(ServiceTest, APlanRunsInAProcessOfItsOwn) {
