@@ -13,7 +13,7 @@ using sql::PostgresPool;
 using sql::Trouble;
 
 constexpr int kConnections = 8;  // of one program; workers and requests share them
-constexpr int kGates = 8;        // connections that hold a lock while a blob is made; apart, so that both never wait
+constexpr int kGates = 16;       // connections that hold a lock while a blob is made; apart, so that both never wait
 constexpr int kTries = 6;
 
 /// An advisory lock for as long as its connection is held.

@@ -61,4 +61,12 @@ Result<std::unique_ptr<JobStore>> open_sqlite_store(const SqliteOptions& options
   return std::make_unique<sql::SqlStore>(std::make_unique<SqliteEngine>(std::move(writer), std::move(reader)));
 }
 
+Result<void> backup_sqlite_store(const std::filesystem::path& file, const std::filesystem::path& target) {
+  if (!std::filesystem::exists(file)) return fault("not_found", "there is no job store in the data folder");
+  KILN_TRY(reader, SqliteConnection::open(file, SqliteConnection::Mode::read_only, system_now_ms));
+  KILN_DO(reader->execute("PRAGMA busy_timeout=5000"));
+  KILN_DO(reader->query("VACUUM INTO ?", target.string()));
+  return {};
+}
+
 }  // namespace kiln

@@ -1,5 +1,5 @@
 // kilnd: serves HTTP and supervises its workers. `kilnd worker` only does the latter, for a fleet. `kilnd bake-worker
-// FOLDER` is such a worker.
+// FOLDER` is such a worker. `kilnd admin` looks after the store.
 
 #include <signal.h>
 
@@ -11,6 +11,7 @@
 #include "server/http/auth.h"
 #include "server/http/http_server.h"
 #include "server/kilnd/options.h"
+#include "server/work/admin.h"
 #include "server/work/bake_worker.h"
 #include "server/work/sandbox.h"
 #include "server/work/service.h"
@@ -85,6 +86,23 @@ int work(Service& service) {
   return 0;
 }
 
+Result<std::string> admin_answer(const DaemonOptions& options, bool& sound) {
+  if (options.admin == "stats") return admin_stats(options.service);
+  if (options.admin == "gc") return admin_gc(options.service);
+  if (options.admin == "backup") return admin_backup(options.service, options.admin_folder);
+  KILN_TRY(scrub, admin_scrub(options.service));
+  sound = scrub.sound;
+  return scrub.json;
+}
+
+int administer(const DaemonOptions& options) {
+  bool sound = true;
+  const auto answer = admin_answer(options, sound);
+  if (!answer) return complain(answer.error());
+  std::printf("%s\n", answer->c_str());
+  return sound ? 0 : 1;
+}
+
 int serve(const DaemonOptions& options) {
   if (!check_sandbox(options.service.require_sandbox)) return kExitConfig;
   const sigset_t ends = end_signals();
@@ -114,5 +132,6 @@ int main(int argc, char** argv) {
   // A worker leaves without unwinding: its results are on disk and its memory goes faster in one piece.
   if (argc > 1 && std::string_view(argv[1]) == kWorkerWord) std::_Exit(bake_worker_main(argc - 1, argv + 1));
   const auto options = parse_options(argc, argv);
-  return options ? serve(*options) : options.error().code;
+  if (!options) return options.error().code;
+  return options->admin.empty() ? serve(*options) : administer(*options);
 }

@@ -104,6 +104,11 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   add_options(app, options, raw);
   app.fallthrough();
   const CLI::App* worker = app.add_subcommand("worker", "bake for a fleet, without an HTTP server");
+  CLI::App* admin = app.add_subcommand("admin", "look after a store and end; prints a line of JSON");
+  admin->add_option("what", options.admin, "stats, gc, scrub, or backup")
+      ->required()
+      ->check(CLI::IsMember({"stats", "gc", "scrub", "backup"}));
+  admin->add_option("folder", options.admin_folder, "a new folder for the backup");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -115,10 +120,14 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   if (tells_password(options.service.stores, argc, argv)) {
     return refuse("a password on the command line is seen by all: use PGPASSWORD, a passfile, or KILN_STORE");
   }
+  if ((options.admin == "backup") == options.admin_folder.empty()) {
+    std::fprintf(stderr, "kilnd: admin backup wants a folder, and nothing else does\n");
+    return tl::make_unexpected(EarlyExit{kExitUsage});
+  }
   if (options.worker_only && options.service.stores.jobs.empty()) {
     return refuse("a worker without --store postgresql://... has nobody to bake for");
   }
-  if (!options.worker_only && !is_loopback(options.address) && options.token_file.empty()) {
+  if (!options.worker_only && options.admin.empty() && !is_loopback(options.address) && options.token_file.empty()) {
     return refuse("--bind " + options.address + " is open to others: give --token-file as well");
   }
   return options;

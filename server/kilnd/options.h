@@ -18,6 +18,8 @@ struct DaemonOptions {
   std::uint64_t max_upload_mb = 8192;
   bool quiet = false;        // no line per request
   bool worker_only = false;  // `kilnd worker`: bakes for a fleet and serves nobody
+  std::string admin;         // `kilnd admin WHAT`: stats, gc, scrub or backup, and then the end
+  std::string admin_folder;  // of a backup
 };
 
 inline constexpr int kExitUsage = 2;
