@@ -75,6 +75,9 @@ class BlobStore {
   /// Removing what is not there is done already.
   virtual Result<void> remove(const std::string& sha256) = 0;
   virtual Result<void> for_each(const std::function<void(const BlobEntry&)>&) const = 0;
+  /// The job store that this place belongs to: `claimant` when it was nobody's until now. What no job of its store
+  /// needs is removed from a place, so two stores must not share one.
+  virtual Result<std::string> owner(const std::string& claimant) = 0;
   /// Fails when blobs cannot be stored now.
   virtual Result<void> check() = 0;
 

@@ -1,6 +1,7 @@
 #include "server/blobs/file_blobs.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 
 #include <chrono>
@@ -60,6 +61,7 @@ class FileBlobs final : public BlobStore {
   Result<void> place(const std::string& sha256, const fs::path& target) const override;
   Result<void> remove(const std::string& sha256) override;
   Result<void> for_each(const std::function<void(const BlobEntry&)>&) const override;
+  Result<std::string> owner(const std::string& claimant) override;
   Result<void> check() override;
 
  protected:
@@ -187,6 +189,29 @@ Result<void> FileBlobs::for_each(const std::function<void(const BlobEntry&)>& vi
     visit({name, entry.file_size(none), none ? 0 : age.count()});  // gone meanwhile: as if just made
   }
   return {};
+}
+
+Result<std::string> FileBlobs::owner(const std::string& claimant) {
+  const fs::path file = folder() / "owner";
+  const int fd = retry_interrupted([&] { return files().open(file, O_RDWR | O_CREAT | O_APPEND, 0600); });
+  if (fd < 0) return io_fault(errno, "open the owner's name");
+  retry_interrupted([&] { return ::flock(fd, LOCK_EX); });  // servers of one fleet may start at the same moment
+  std::string owner;
+  auto read = read_all(files(), fd, [&](std::span<const std::uint8_t> piece) {
+    owner.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+  });
+  bool written = true;
+  if (read && owner.empty()) {
+    written = files().write(fd, claimant.data(), claimant.size()) == static_cast<ssize_t>(claimant.size()) &&
+              files().fsync(fd) == 0;
+    owner = claimant;
+  }
+  const int error = errno;
+  files().close(fd);
+  if (!read) return tl::make_unexpected(read.error());
+  if (!written) return io_fault(error, "write the owner's name");
+  if (auto synced = sync_folder(files(), folder()); !synced) return tl::make_unexpected(synced.error());
+  return owner;
 }
 
 Result<void> FileBlobs::check() {

@@ -1,6 +1,7 @@
 #include "server/blobs/s3_blobs.h"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <ctime>
@@ -78,6 +79,7 @@ class S3Blobs final : public BlobStore {
     return is_sha256(sha256) ? client_->remove(key_of(sha256)) : Result<void>();
   }
   Result<void> for_each(const std::function<void(const BlobEntry&)>&) const override;
+  Result<std::string> owner(const std::string& claimant) override;
   Result<void> check() override {
     if (auto probe = write(); !probe) return tl::make_unexpected(probe.error());
     return client_->check();
@@ -133,6 +135,29 @@ Result<void> S3Blobs::place(const std::string& sha256, const fs::path& target) c
   }
   if (!got) files().unlink(target);
   return got;
+}
+
+Result<std::string> S3Blobs::owner(const std::string& claimant) {
+  constexpr const char* kKey = "owner";
+  std::string owner;
+  const auto got = client_->get(
+      kKey, [&] { owner.clear(); },
+      [&](std::span<const std::uint8_t> piece) {
+        owner.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+        return owner.size() <= 64;
+      });
+  if (got) return owner;
+  if (got.error().code != "not_found") return tl::make_unexpected(got.error());
+  const int fd = ::memfd_create("owner", MFD_CLOEXEC);
+  if (fd < 0 || ::write(fd, claimant.data(), claimant.size()) != static_cast<ssize_t>(claimant.size())) {
+    if (fd >= 0) ::close(fd);
+    return io_fault(errno, "write the owner's name");
+  }
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(claimant.data()), claimant.size());
+  const auto put = client_->put(kKey, sha256_hex(bytes), fd, claimant.size());
+  ::close(fd);
+  if (!put) return tl::make_unexpected(put.error());
+  return claimant;
 }
 
 Result<void> S3Blobs::for_each(const std::function<void(const BlobEntry&)>& visit) const {

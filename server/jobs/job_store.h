@@ -147,9 +147,11 @@ class JobStore {
   /// Other programs write to this store as well: only the end of a lease tells that a worker is gone.
   virtual bool shared() const = 0;
   /// `wake` is called soon after another program wrote. A hint that may get lost: look every few seconds all the same.
-  /// At most once, before the store is used.
+  /// An empty one ends it: no call is under way when this returns.
   virtual void on_change(std::function<void()> wake) = 0;
 
+  /// Who this store is, for ever: 32 hex digits, drawn when its tables were made.
+  virtual Result<std::string> identity() = 0;
   /// Writes and reads back one row: ready to serve.
   virtual Result<void> check_writable() = 0;
 };

@@ -14,6 +14,8 @@ constexpr const char* kTables = R"sql(
 CREATE DOMAIN word AS TEXT COLLATE "C";
 CREATE TABLE meta(version INTEGER NOT NULL);
 INSERT INTO meta VALUES(1);
+CREATE TABLE identity(id word NOT NULL);
+INSERT INTO identity SELECT replace(gen_random_uuid()::text, '-', '');
 
 CREATE TABLE job(
   id word PRIMARY KEY CHECK(length(id) = 26),

@@ -43,6 +43,7 @@ class SqlStore final : public JobStore {
   Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) override;
   Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) override;
   Result<std::vector<std::string>> forget_unused_blobs(Millis grace) override;
+  Result<std::string> identity() override;
   Result<void> check_writable() override;
 
   Result<std::unique_ptr<BlobGate>> enter_blob_gate() override { return engine_->blob_gate(false); }

@@ -202,6 +202,13 @@ Result<std::vector<std::string>> SqlStore::forget_unused_blobs(Millis grace) {
   });
 }
 
+Result<std::string> SqlStore::identity() {
+  return read([&](Connection& db) -> Result<std::string> {
+    KILN_TRY(rows, db.query("SELECT id FROM identity"));
+    return rows.empty() ? std::string() : rows.front().text(0);
+  });
+}
+
 Result<void> SqlStore::check_writable() {
   return write([&](Connection& db, std::int64_t now) -> Result<void> {
     KILN_DO(db.run("UPDATE counter SET value=? WHERE name='ready'", now));

@@ -92,8 +92,8 @@ CREATE TRIGGER job_event_is_append_only BEFORE UPDATE ON job_event
   BEGIN SELECT RAISE(ABORT, 'events are append-only'); END;
 )sql";
 
-// From version 1 to 2: tenants. What was there belongs to the one without a name.
-constexpr const char* kTenants = R"sql(
+// From version 1 to 2: tenants (what was there belongs to the one without a name), and who this store is.
+constexpr const char* kVersion2 = R"sql(
 ALTER TABLE job ADD COLUMN tenant TEXT NOT NULL DEFAULT '';
 CREATE INDEX job_by_tenant ON job(tenant, created_at, id);
 DROP INDEX job_running;
@@ -105,6 +105,8 @@ CREATE TABLE blob_tenant(
   PRIMARY KEY(sha256, tenant)
 ) STRICT;
 INSERT INTO blob_tenant SELECT sha256, '' FROM blob;
+CREATE TABLE identity(id TEXT NOT NULL) STRICT;
+INSERT INTO identity SELECT lower(hex(randomblob(16)));
 )sql";
 
 struct Setting {
@@ -170,7 +172,7 @@ Result<void> make_tables(SqliteConnection& db) {
   KILN_TRY(version, single_value(db, "PRAGMA user_version"));
   if (version == "0") KILN_DO(db.execute(kTables));
   if (version == "0" || version == "1") {
-    KILN_DO(db.execute(kTenants));
+    KILN_DO(db.execute(kVersion2));
     KILN_DO(db.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion)));
   } else if (version != std::to_string(kSchemaVersion)) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +

@@ -22,7 +22,8 @@ namespace {
 
 int complain(const Fault& fault) {
   std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
-  for (const char* config : {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused"}) {
+  for (const char* config :
+       {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused", "blobs_of_another"}) {
     if (fault.code == config) return kExitConfig;
   }
   return 1;

@@ -32,6 +32,7 @@ Result<Stores> open_stores(const ServiceOptions& options) {
   }
   KILN_TRY(jobs, open_job_store(options.stores, options.data));
   KILN_TRY(blobs, open_blob_store(options.stores, options.data));
+  if (auto ours = check_owner(options.stores, *jobs, *blobs); !ours) return tl::make_unexpected(ours.error());
   stores.jobs = std::move(jobs);
   stores.blobs = std::move(blobs);
   return stores;

@@ -339,6 +339,7 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   KILN_TRY(lock, DataLock::take(options.data));
   KILN_TRY(store, open_job_store(options.stores, options.data));
   KILN_TRY(blobs, open_blob_store(options.stores, options.data));
+  if (auto ours = check_owner(options.stores, *store, *blobs); !ours) return tl::make_unexpected(ours.error());
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
   if (!error) std::filesystem::create_directories(options.data / "checkpoints", error);

@@ -71,4 +71,14 @@ Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions& options, 
   return open_s3_blobs(s3, data);
 }
 
+Result<void> check_owner(const StoreOptions& options, JobStore& jobs, BlobStore& blobs) {
+  if (options.blobs.empty()) return {};  // in the data folder, beside its own job store
+  KILN_TRY(identity, jobs.identity());
+  KILN_TRY(owner, blobs.owner(identity));
+  if (owner == identity) return {};
+  return fault("blobs_of_another",
+               "the place of --blobs belongs to another job store, which would lose its blobs to this one (remove "
+               "'owner' there to give it away)");
+}
+
 }  // namespace kiln

@@ -22,5 +22,7 @@ Result<void> check_addresses(const StoreOptions&);
 bool holds_password(const StoreOptions&);
 Result<std::unique_ptr<JobStore>> open_job_store(const StoreOptions&, const std::filesystem::path& data);
 Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions&, const std::filesystem::path& data);
+/// "blobs_of_another" when a place that may be shared belongs to another job store, which would lose its blobs here.
+Result<void> check_owner(const StoreOptions&, JobStore&, BlobStore&);
 
 }  // namespace kiln

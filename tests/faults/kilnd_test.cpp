@@ -38,9 +38,9 @@ class KilndTest : public ::testing::Test {
     std::string text;
   };
   /// Runs a kilnd that should end by itself.
-  End refuse(const std::string& arguments) const {
+  End refuse(const std::string& arguments, const std::string& data = "data") const {
     const std::string out = folder_ / "out.txt";
-    const std::string command = std::string("timeout 20 ") + KILN_DAEMON + " --data " + (folder_ / "data").string() +
+    const std::string command = std::string("timeout 20 ") + KILN_DAEMON + " --data " + (folder_ / data).string() +
                                 " --port 0 " + arguments + " >" + out + " 2>&1";
     const int status = std::system(command.c_str());
     std::ifstream in(out);
@@ -125,6 +125,15 @@ TEST_F(KilndTest, ABackupOfARunningServerServesTheSameJobsAndBytes) {
   }
   const End stats = refuse("admin stats");
   EXPECT_EQ(json::parse(stats.text)["jobs"]["succeeded"], 1) << stats.text;
+}
+
+TEST_F(KilndTest, BlobsOfAnotherStoreAreRefusedBeforeTheyAreLost) {
+  const std::string shared = "dir:" + (folder_ / "shared").string();
+  { const auto first = start({"--blobs", shared}); }
+  { const auto again = start({"--blobs", shared}); }
+  const End end = refuse("--blobs " + shared, "other");
+  EXPECT_EQ(end.code, 78) << end.text;
+  EXPECT_NE(end.text.find("belongs to another"), std::string::npos) << end.text;
 }
 
 TEST_F(KilndTest, ScrubFindsAFlippedBitAndGcTakesWhatNobodyNeeds) {

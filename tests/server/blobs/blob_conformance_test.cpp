@@ -194,6 +194,14 @@ TEST_P(BlobConformance, FilesOfTheSpoolGoWhenTheirWriterIsGoneAndNotBefore) {
   EXPECT_EQ(spooled(), 2U);
 }
 
+TEST_P(BlobConformance, ItBelongsToWhoeverClaimedItFirst) {
+  const std::string first(32, '1'), second(32, '2');
+  EXPECT_EQ(store().owner(first).value(), first);
+  EXPECT_EQ(open()->owner(second).value(), first);
+  EXPECT_EQ(store().owner(first).value(), first);
+  EXPECT_TRUE(store().for_each([](const BlobEntry& blob) { ADD_FAILURE() << blob.sha256 << " is no blob"; }));
+}
+
 TEST_P(BlobConformance, ItIsReady) { EXPECT_TRUE(store().check()); }
 
 }  // namespace

@@ -29,6 +29,7 @@ void empty_bucket() {
   std::vector<std::string> all;
   EXPECT_TRUE(store->for_each([&](const BlobEntry& blob) { all.push_back(blob.sha256); }));
   for (const std::string& sha256 : all) EXPECT_TRUE(store->remove(sha256));
+  EXPECT_TRUE(swift().remove("owner"));
   std::filesystem::remove_all(folder);
 }
 

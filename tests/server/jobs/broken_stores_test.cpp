@@ -87,6 +87,7 @@ class BrokenStore final : public JobStore {
   }
   bool shared() const override { return store_->shared(); }
   void on_change(std::function<void()> wake) override { store_->on_change(std::move(wake)); }
+  Result<std::string> identity() override { return store_->identity(); }
   Result<void> check_writable() override { return store_->check_writable(); }
 
  private:

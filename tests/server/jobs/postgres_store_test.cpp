@@ -125,8 +125,8 @@ TEST_F(PostgresStoreTest, TheSameKeyFromManyProgramsAtOnceMakesOneJob) {
 }
 
 TEST_F(PostgresStoreTest, AWriteOfOneProgramWakesAnother) {
-  const auto other = open();
   std::atomic<int> woken{0};
+  const auto other = open();
   other->on_change([&] { ++woken; });
   const auto until = [&](int least) {
     for (int i = 0; i < 500 && woken < least; ++i) std::this_thread::sleep_for(10ms);

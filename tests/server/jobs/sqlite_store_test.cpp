@@ -67,7 +67,7 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
     id = finished_job(*store).id;
   }
   // Back to how version 1 was.
-  ASSERT_EQ(run("DROP TABLE blob_tenant; DROP INDEX job_by_tenant; DROP INDEX job_running;"
+  ASSERT_EQ(run("DROP TABLE blob_tenant; DROP TABLE identity; DROP INDEX job_by_tenant; DROP INDEX job_running;"
                 "ALTER TABLE job DROP COLUMN tenant; CREATE INDEX job_running ON job(id) WHERE state='running';"
                 "PRAGMA user_version=1"),
             SQLITE_OK);

@@ -308,6 +308,14 @@ TEST_P(StoreConformance, TheTenantWithTheFewestRunningJobsIsNext) {
   EXPECT_EQ(order, "ababa");
 }
 
+TEST_P(StoreConformance, AStoreIsTheSameForEver) {
+  const std::string identity = store().identity().value();
+  EXPECT_EQ(identity.size(), 32U);
+  EXPECT_EQ(identity.find_first_not_of("0123456789abcdef"), std::string::npos) << identity;
+  reopen();
+  EXPECT_EQ(store().identity().value(), identity);
+}
+
 TEST_P(StoreConformance, TheBlobGateLetsManyInAndThenOneAlone) {
   auto first = store().enter_blob_gate();
   auto second = store().enter_blob_gate();
