@@ -37,7 +37,8 @@ class PostgresEngine final : public sql::Engine {
   const char* keep_rows(bool skip) const override { return skip ? " FOR UPDATE SKIP LOCKED" : " FOR UPDATE"; }
   bool shared() const override { return true; }
   void on_change(std::function<void()> wake) override {
-    listener_ = std::make_unique<sql::PostgresListener>(options_, std::move(wake));
+    listener_.reset();
+    if (wake) listener_ = std::make_unique<sql::PostgresListener>(options_, std::move(wake));
   }
 
   Result<std::unique_ptr<BlobGate>> blob_gate(bool alone) override {

@@ -30,7 +30,9 @@ void Neighbours::stop() {
     stopping_ = true;
     changed_.notify_all();
   }
-  if (thread_.joinable()) thread_.join();
+  if (!thread_.joinable()) return;
+  place_.store.on_change({});
+  thread_.join();
 }
 
 void Neighbours::work() {

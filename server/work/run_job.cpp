@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
 #include <fstream>
+#include <mutex>
 #include <random>
 #include <sstream>
 #include <thread>
@@ -54,12 +56,26 @@ std::uint64_t scene_bytes(const WorkFolder& folder) {
   return error ? 0 : bytes;
 }
 
-/// Progress and heartbeats of one run.
+/// Progress and heartbeats of one run, from the first byte of input that is fetched to the last of a result that is
+/// stored: a thread of its own, since either may take longer than a lease.
 class Pulse {
  public:
-  Pulse(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {}
+  Pulse(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {
+    thread_ = std::thread([this] { work(); });
+  }
+  Pulse(const Pulse&) = delete;
+  Pulse& operator=(const Pulse&) = delete;
+  ~Pulse() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+      changed_.notify_all();
+    }
+    thread_.join();
+  }
 
   void progress(const ProgressEvent& event) {
+    const std::lock_guard lock(mutex_);
     const auto now = Clock::now();
     const bool new_stage = event.stage != newest_.stage;
     newest_ = {event.stage, event.done, event.total, std::max(newest_.fraction, event.fraction), {}, event.error};
@@ -70,27 +86,34 @@ class Pulse {
     place_.bus.announce_progress(claim_.ref.job_id, newest_);
   }
 
-  void tick() {
-    const auto now = Clock::now();
+ private:
+  void work() {
     const Millis lease = place_.options.lease;
-    if (now - tried_ < std::min(kStoreProgressEvery, lease / 4)) return;
-    tried_ = now;
-    const auto beat = place_.store.heartbeat(claim_.ref, lease, newest_);
-    // Without an answer the job is given up before the store gives it to another.
-    if (!beat && now - answered_ > lease * 3 / 4) stop_.ask(StopReason::lost);
-    if (!beat) return;
-    answered_ = now;
-    if (*beat == Beat::lost) stop_.ask(StopReason::lost);
-    if (*beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
+    auto answered = Clock::now();
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, std::min(kStoreProgressEvery, lease / 4), [&] { return over_; })) {
+      const JobProgress newest = newest_;
+      lock.unlock();
+      const auto beat = place_.store.heartbeat(claim_.ref, lease, newest);
+      if (beat) answered = Clock::now();
+      // Without an answer the job is given up before the store gives it to another.
+      const bool too_late = !beat && Clock::now() - answered > lease * 3 / 4;
+      if (too_late || (beat && *beat == Beat::lost)) stop_.ask(StopReason::lost);
+      if (beat && *beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
+      lock.lock();
+    }
   }
 
- private:
   const Claim& claim_;
   StopSignal& stop_;
   const WorkPlace& place_;
   const Clock::time_point started_ = Clock::now();
-  Clock::time_point shown_{}, tried_ = Clock::now(), answered_ = Clock::now();
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool over_ = false;
+  Clock::time_point shown_{};
   JobProgress newest_;
+  std::thread thread_;
 };
 
 /// Tries again while the store cannot write, as long as the claim may hold; the queue waits meanwhile.
@@ -129,21 +152,21 @@ class JobRun {
   void conclude() {
     const auto limits = limits_of(claim_.job.recipe);
     if (!limits) return fail({limits.error(), 500});
+    Pulse pulse(claim_, stop_, place_);
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
     WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
     order.checkpoint = checkpoint_.load();
     const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
-    end_as(bake(*folder, *limits), *folder);
+    end_as(bake(*folder, *limits, pulse), *folder);
   }
 
-  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits) {
-    Pulse pulse(claim_, stop_, place_);
+  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits, Pulse& pulse) {
     const std::uint64_t memory = limits.memory_mb << 20;
     return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder)},
                       {memory, limits.wall_s}, stop_,
                       {[&](const ProgressEvent& event) { pulse.progress(event); },
-                       [&](const std::string& text) { checkpoint_.save(text); }, [&] { pulse.tick(); }});
+                       [&](const std::string& text) { checkpoint_.save(text); }});
   }
 
   void end_as(const WorkerOutcome& outcome, const WorkFolder& folder) {
