@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/base/sha256.h"
+#include "tests/fixtures/fake_s3.h"
 #include "tests/server/work/service_fixture.h"
 
 namespace kiln::testing {
@@ -213,6 +214,21 @@ TEST_F(ServiceTest, ANearlyFullDiskRefusesUploadsAndLetsTheQueueWait) {
   start();
   EXPECT_EQ(service_->wait_done(id, 20s)->state, JobState::succeeded);
   EXPECT_TRUE(unready().empty());
+}
+
+TEST_F(ServiceTest, AJobWhoseInputsComeSlowlyKeepsItsLease) {
+  FakeS3 store;
+  options_.stores.blobs = std::string("s3://") + FakeS3::kBucket;
+  options_.stores.s3_endpoint = store.endpoint();
+  options_.stores.s3_key = options_.stores.s3_secret = "fake";
+  options_.lease = 1s;
+  open();
+  const std::string id = submit("ok").id;
+  store.trouble(FakeS3::Trouble::stalled, 1);  // three seconds for the first input
+  service_->start();
+  const Job job = service_->wait_done(id, 20s).value();
+  EXPECT_EQ(job.state, JobState::succeeded);
+  EXPECT_EQ(job.attempt, 1) << "the lease ended while the input came";
 }
 
 TEST_F(ServiceTest, AnUnusedAssetIsCollectedAndAUsedOneIsNot) {
