@@ -16,3 +16,5 @@ find_path(TINYGLTF_INCLUDE_DIR tiny_gltf.h REQUIRED)  # the header alone: core/a
 find_package(SQLite3 REQUIRED)
 find_package(CLI11 REQUIRED)
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
+pkg_check_modules(libcurl REQUIRED IMPORTED_TARGET libcurl)
+pkg_check_modules(libpq REQUIRED IMPORTED_TARGET libpq)

@@ -85,8 +85,9 @@ constexpr const char* kOtherSchemas = R"json(
       "type": "object", "required": ["name", "description", "recipe"], "properties": {"name": {"type": "string"},
         "description": {"type": "string"}, "recipe": {"type": "object"}}}}}},
   "Plan": {"type": "object"},
-  "Readiness": {"type": "object", "required": ["ready", "reasons"], "properties": {"ready": {"type": "boolean"},
-      "reasons": {"type": "array", "items": {"type": "string"}}}},
+  "Readiness": {"type": "object", "required": ["ready", "reasons", "checks"], "properties": {
+      "ready": {"type": "boolean"}, "reasons": {"type": "array", "items": {"type": "string"}},
+      "checks": {"type": "object", "additionalProperties": {"type": "string"}}}},
   "Version": {"type": "object", "required": ["engine", "api"], "properties": {"engine": {"type": "string"},
       "api": {"type": "string"}}},
   "Problem": {"type": "object", "required": ["type", "title", "status", "detail"], "properties": {

@@ -1,6 +1,7 @@
 #include "server/blobs/blob_io.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 
 #include <vector>
 
@@ -35,6 +36,26 @@ Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::sp
     take({piece.data(), static_cast<std::size_t>(got)});
     offset += got;
   }
+}
+
+Result<StoredBlob> seal_file(FileLayer& files, const std::filesystem::path& file) {
+  const int fd = retry_interrupted([&] { return files.open(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK); });
+  if (fd < 0 && (errno == ENOENT || errno == ELOOP)) return fault("not_found", "there is no such result");
+  if (fd < 0) return io_fault(errno, "open a result");
+  struct stat status {};
+  const bool regular = ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
+  Sha256 hash;
+  std::uint64_t bytes = 0;
+  Result<void> done = regular ? read_all(files, fd,
+                                         [&](std::span<const std::uint8_t> piece) {
+                                           hash.update(piece);
+                                           bytes += piece.size();
+                                         })
+                              : Result<void>(fault("not_found", "there is no such result: not a regular file"));
+  if (done && files.fsync(fd) != 0) done = io_fault(errno, "make a result durable");
+  files.close(fd);
+  if (!done) return tl::make_unexpected(done.error());
+  return StoredBlob{hash.hex(), bytes, false};
 }
 
 }  // namespace kiln

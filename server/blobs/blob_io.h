@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/base/result.h"
+#include "server/blobs/blob_writer.h"
 #include "server/blobs/file_layer.h"
 
 namespace kiln {
@@ -27,5 +28,8 @@ Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder);
 
 /// Feeds the file to `take` piece by piece.
 Result<void> read_all(FileLayer& files, int fd, const std::function<void(std::span<const std::uint8_t>)>& take);
+
+/// Hashes and syncs a file that its writer closed. Links are not followed; what is no regular file is not_found.
+Result<StoredBlob> seal_file(FileLayer& files, const std::filesystem::path& file);
 
 }  // namespace kiln

@@ -1,8 +1,9 @@
 #pragma once
-// Content-addressed files: <root>/cas/ab/<sha256>. A blob is whole or not there, whenever the machine stops:
-//   write <root>/tmp/x (O_EXCL, hashed on the way) -> fsync -> rename to cas/ab/<sha256> -> fsync cas/ab.
-// A failed fsync means the file is lost: it is deleted, never synced again.
-// Fault codes: disk_full (507), io_failed, not_found, hash_mismatch, upload_busy, offset_mismatch.
+// Content-addressed bytes: a blob is named by its SHA-256, and is whole or not there, whenever a machine stops. One
+// interface, three places: files of this machine or a shared directory (file_blobs.h), an S3 store (s3_blobs.h); one
+// conformance suite (tests/server/blobs).
+// Fault codes: disk_full (507), io_failed, not_found, hash_mismatch, upload_busy, offset_mismatch, and of an S3 store
+// blobs_unavailable (503, try again), blobs_refused (wrong credentials, no such bucket), too_large.
 
 #include <cstdint>
 #include <filesystem>
@@ -13,108 +14,93 @@
 #include <vector>
 
 #include "core/base/result.h"
-#include "core/base/sha256.h"
+#include "server/blobs/blob_writer.h"
 #include "server/blobs/file_layer.h"
 
 namespace kiln {
 
-struct StoredBlob {
-  std::string sha256;
-  std::uint64_t bytes = 0;
-  bool existed = false;  // the same bytes were there before
-};
-
-/// An open blob. Keeps its bytes readable even if the blob is removed meanwhile.
+/// An open blob. Any thread may read.
 class BlobReader {
  public:
-  BlobReader(FileLayer& files, int fd, std::uint64_t size) : files_(&files), fd_(fd), size_(size) {}
-  BlobReader(BlobReader&&) noexcept;
-  BlobReader& operator=(BlobReader&&) noexcept;
-  ~BlobReader();
+  /// Where its bytes come from.
+  class Source {
+   public:
+    virtual ~Source() = default;
+    virtual Result<std::size_t> read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
+  };
+  BlobReader(std::unique_ptr<Source> source, std::uint64_t size) : source_(std::move(source)), size_(size) {}
   std::uint64_t size() const { return size_; }
-  /// Fills `out` from `offset` on; fewer bytes only at the end of the blob. Any thread.
-  Result<std::size_t> read(std::uint64_t offset, std::span<std::uint8_t> out) const;
+  /// Fills `out` from `offset` on; fewer bytes only at the end of the blob.
+  Result<std::size_t> read(std::uint64_t offset, std::span<std::uint8_t> out) const {
+    return source_->read(offset, out);
+  }
 
  private:
-  friend class BlobStore;
-  FileLayer* files_;
-  int fd_;
+  std::unique_ptr<Source> source_;
   std::uint64_t size_;
 };
 
-class BlobStore;
-
-/// A blob on its way in. Dropped without finish(): an anonymous one vanishes, a named one can be resumed.
-class BlobWriter {
- public:
-  BlobWriter(BlobWriter&&) noexcept;
-  BlobWriter& operator=(BlobWriter&&) = delete;
-  ~BlobWriter();
-  Result<void> write(std::span<const std::uint8_t> bytes);
-  /// Bytes so far, those of an earlier, resumed part included.
-  std::uint64_t bytes() const { return bytes_; }
-  /// Makes the blob durable. A named writer refuses other bytes than its name's ("hash_mismatch", nothing stays).
-  Result<StoredBlob> finish();
-
- private:
-  friend class BlobStore;
-  BlobWriter(BlobStore& store, std::filesystem::path tmp, int fd, std::string expected);
-  void discard();
-  BlobStore* store_;
-  std::filesystem::path tmp_;
-  int fd_;
-  std::string expected_;  // sha256 given by the uploader, or empty
-  Sha256 hash_;
-  std::uint64_t bytes_ = 0;
+struct BlobEntry {
+  std::string sha256;
+  std::uint64_t bytes = 0;
+  double age_s = 0;  // since it was stored last
 };
 
-/// One process owns a root at a time. Every function may be called from any thread.
+/// Every function may be called from any thread. Bytes on their way in lie in the spool, a folder `tmp` of this machine
+/// or of a shared directory; each file there is locked by whoever writes it (flock), so that a file without a lock is
+/// one whose writer is gone.
 class BlobStore {
  public:
-  /// Makes the folders. `files` must outlive the store.
-  static Result<std::unique_ptr<BlobStore>> open(const std::filesystem::path& root, FileLayer& files = real_files());
-  ~BlobStore();
+  virtual ~BlobStore() = default;
 
   /// A writer of bytes whose hash is not known yet.
   Result<BlobWriter> write();
   /// A writer of the blob `sha256` from `offset` on, which must be partial_bytes(sha256) ("offset_mismatch") or 0
   /// (starts anew). One at a time ("upload_busy").
   Result<BlobWriter> write_named(const std::string& sha256, std::uint64_t offset = 0);
-  /// How much of an interrupted named upload is kept.
+  /// How much of an interrupted named upload is kept in this spool.
   std::uint64_t partial_bytes(const std::string& sha256) const;
-
-  /// Moves finished files (same file system, closed by their writer) into the store, in their order. Fails with
-  /// not_found for what is no regular file.
-  Result<std::vector<StoredBlob>> adopt(std::span<const std::filesystem::path> files);
-
-  Result<BlobReader> open_blob(const std::string& sha256) const;
-  bool exists(const std::string& sha256) const;
-  /// Where a blob lies, for hard links into a worker's folder.
-  std::filesystem::path path_of(const std::string& sha256) const;
-  Result<void> remove(const std::string& sha256);
-  void for_each(const std::function<void(const std::string& sha256, std::uint64_t bytes)>&) const;
-
-  /// Removes the files of anonymous writers. Only at start: afterwards they may be alive. Returns how many went.
+  /// Removes files of anonymous writers that are gone. Returns how many went.
   int remove_dead_writers();
   /// Removes named uploads that nobody writes and that are older than `age_s`. Returns how many went.
   int expire_partials(double age_s);
 
+  /// Moves finished files (closed by their writer, on the spool's file system) into the store, in their order. Fails
+  /// with not_found for what is no regular file.
+  virtual Result<std::vector<StoredBlob>> adopt(std::span<const std::filesystem::path> files) = 0;
+  virtual Result<BlobReader> open_blob(const std::string& sha256) const = 0;
+  bool exists(const std::string& sha256) const { return open_blob(sha256).has_value(); }
+  /// Puts the bytes at `target`, which must not be there: input of a worker.
+  virtual Result<void> place(const std::string& sha256, const std::filesystem::path& target) const = 0;
+  /// Removing what is not there is done already.
+  virtual Result<void> remove(const std::string& sha256) = 0;
+  virtual Result<void> for_each(const std::function<void(const BlobEntry&)>&) const = 0;
+  /// The job store that this place belongs to: `claimant` when it was nobody's until now. What no job of its store
+  /// needs is removed from a place, so two stores must not share one.
+  virtual Result<std::string> owner(const std::string& claimant) = 0;
+  /// Fails when blobs cannot be stored now.
+  virtual Result<void> check() = 0;
+
+  /// The folder whose disk fills up with what is stored or on its way.
+  const std::filesystem::path& folder() const { return folder_; }
+
+ protected:
+  /// `folder` holds, or will hold, the spool `tmp`.
+  BlobStore(std::filesystem::path folder, FileLayer& files) : folder_(std::move(folder)), files_(&files) {}
+  /// Stores a synced file of the spool under its hash; the file is gone afterwards.
+  virtual Result<StoredBlob> publish(const std::filesystem::path& tmp, const std::string& sha256,
+                                     std::uint64_t bytes) = 0;
+  FileLayer& files() const { return *files_; }
+
  private:
   friend class BlobWriter;
-  struct State;
-  BlobStore(std::filesystem::path root, FileLayer& files);
-  Result<StoredBlob> publish(const std::filesystem::path& tmp, const std::string& sha256, std::uint64_t bytes);
-  Result<void> name(const std::filesystem::path& tmp, const StoredBlob&);
-  Result<void> sync_shelves(std::span<const StoredBlob>);
-  Result<StoredBlob> seal(const std::filesystem::path& file) const;
-  void release_name(const std::string& sha256);
-  int remove_tmp(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
-  std::filesystem::path root_;
+  std::filesystem::path part_of(const std::string& sha256) const;
+  int remove_unlocked(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
+  std::filesystem::path folder_;
   FileLayer* files_;
-  std::unique_ptr<State> state_;
 };
 
-/// True for 64 lower-case hex digits, the only names this store knows.
+/// True for 64 lower-case hex digits, the only names a store knows.
 bool is_sha256(const std::string& text);
 
 }  // namespace kiln

@@ -1,6 +1,7 @@
 #pragma once
 // Bearer tokens. Kept and compared as SHA-256, so neither memory dumps nor timing tell one.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,12 +10,26 @@
 
 namespace kiln {
 
-/// The hashes of the tokens in a file, one of 43 characters [A-Za-z0-9_-] a line; empty lines and #-comments are
-/// skipped. Fails  bad_token_file: unreadable, without any token, or with a line that is none.
-Result<std::vector<std::string>> read_token_hashes(const std::string& file);
+/// Who a token stands for and what it may do.
+struct AccessToken {
+  std::string hash;    // SHA-256 of the token
+  std::string tenant;  // sees its own jobs and assets alone; with `admin` everybody's
+  bool read = true, submit = true, admin = true;
+  int max_jobs = 0;     // unfinished at a time; 0: no limit
+  int max_uploads = 0;  // bodies on their way at a time; 0: no limit but the server's
+  double rate = 0;      // requests a second, ten seconds' worth at once; 0: no limit
+};
 
-/// True when the request carries one of the tokens: `Authorization: Bearer TOKEN`, or Basic with the token as password
+/// The tokens in a file, one a line; empty lines and #-comments are skipped. A line is a token of 43 characters
+/// [A-Za-z0-9_-], and after it, as far as wanted:
+///   tenant=NAME scopes=read,submit,admin jobs=N uploads=N rate=N
+/// Scopes are all of them by default, of a token with a tenant read and submit. `admin` sees everybody's jobs and the
+/// metrics, and goes with neither tenant nor jobs. Fails  bad_token_file: unreadable,
+/// without any token, or with a line that is none.
+Result<std::vector<AccessToken>> read_tokens(const std::string& file);
+
+/// The place of the token that the request carries: `Authorization: Bearer TOKEN`, or Basic with the token as password
 /// (what a browser sends, for pages and event streams too).
-bool carries_token(const Head&, const std::vector<std::string>& hashes);
+std::optional<std::size_t> carried_token(const Head&, const std::vector<AccessToken>&);
 
 }  // namespace kiln

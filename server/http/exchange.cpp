@@ -7,7 +7,6 @@
 #include <cctype>
 #include <chrono>
 
-#include "server/http/auth.h"
 #include "server/http/parse_head.h"
 
 namespace kiln {
@@ -81,9 +80,11 @@ std::string request_id_of(std::string_view given) {
   return id;
 }
 
-Exchange::Exchange(ExchangeRules rules, const Handlers& handlers, const Handler& elsewhere, Gate& uploads,
-                   HttpMetrics& metrics, LogLine log)
+Exchange::Exchange(ExchangeRules rules, Service& service, const Handlers& handlers, const Handler& elsewhere,
+                   Gate& uploads, HttpMetrics& metrics, LogLine log)
     : rules_(std::move(rules)),
+      service_(service),
+      visitors_(rules_.tokens, service),
       uploads_(uploads),
       metrics_(metrics),
       log_(std::move(log)),
@@ -108,15 +109,25 @@ Answer<void> Exchange::check_origin(const Head& head) const {
   return {};
 }
 
-Answer<void> Exchange::check(const Head& head, const Endpoint* endpoint) const {
-  if (auto origin = check_origin(head); !origin) return origin;
-  if (!rules_.token_hashes.empty() && !is_open_to_all(endpoint) && !carries_token(head, rules_.token_hashes))
-    return refuse("unauthorized", "this server asks for a token: Authorization: Bearer TOKEN");
-  if (endpoint == nullptr) return {};
+/// The one who asks; null where nobody is asked for a token.
+Answer<Visitor*> Exchange::check_token(const Head& head, const Endpoint* endpoint) const {
+  if (visitors_.anyone() || is_open_to_all(endpoint)) return nullptr;
+  Visitor* visitor = visitors_.find(head);
+  if (visitor == nullptr) return refuse("unauthorized", "this server asks for a token: Authorization: Bearer TOKEN");
+  const bool metrics = endpoint != nullptr && endpoint->operation == "metrics";
+  const AccessToken& may = visitor->token;
+  if (metrics ? !may.admin : changes_something(head) ? !may.submit : !may.read)
+    return refuse("forbidden", "this token is not for that");
+  if (!visitor->rate.take(std::chrono::steady_clock::now()))
+    return refuse("rate_limited", "this token is used too often; try again in a moment");
+  return visitor;
+}
+
+Answer<void> Exchange::check_body(const Head& head, const Endpoint& endpoint) const {
   const std::string_view expect = field_of(head, "expect");
   if (!expect.empty() && expect != "100-continue")
     return refuse("expectation_failed", "only 100-continue is understood");
-  if (!takes_body(*endpoint)) return {};
+  if (!takes_body(endpoint)) return {};
   const std::string_view encoding = field_of(head, "content-encoding");
   if (!encoding.empty() && encoding != "identity")
     return refuse("unsupported_encoding", "bodies are taken as they are, without Content-Encoding");
@@ -127,11 +138,19 @@ Answer<void> Exchange::check(const Head& head, const Endpoint* endpoint) const {
 }
 
 Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Request& request) {
-  if (auto allowed = check(request.head, endpoint); !allowed) return problem_reply(allowed.error());
-  if (endpoint == nullptr || !takes_body(*endpoint)) return handler(request);
-  request.upload = uploads_.enter();
-  if (!request.upload)
-    return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
+  if (auto origin = check_origin(request.head); !origin) return problem_reply(origin.error());
+  auto visitor = check_token(request.head, endpoint);
+  if (!visitor) return problem_reply(visitor.error());
+  request.service = *visitor == nullptr ? &service_ : &(*visitor)->service;
+  if (endpoint == nullptr) return handler(request);
+  if (auto body = check_body(request.head, *endpoint); !body) return problem_reply(body.error());
+  if (!takes_body(*endpoint)) return handler(request);
+  const Pass own = *visitor == nullptr ? Pass() : (*visitor)->uploads.enter();
+  if (*visitor != nullptr && !own)
+    return problem_reply(make_problem("quota", "this token has too many uploads under way; try again in a moment"));
+  const Pass shared = uploads_.enter();
+  if (!shared) return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
+  request.upload = std::make_shared<std::pair<Pass, Pass>>(own, shared);
   return handler(request);
 }
 

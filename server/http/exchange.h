@@ -10,20 +10,21 @@
 #include "server/http/gate.h"
 #include "server/http/httplib_server.h"
 #include "server/http/metrics.h"
+#include "server/http/visitors.h"
 
 namespace kiln {
 
 struct ExchangeRules {
   std::uint64_t max_upload_bytes = 8ull << 30;
-  std::vector<std::string> hosts;         // names a Host field may have; empty: any
-  std::vector<std::string> token_hashes;  // who may come in (auth.h); empty: everybody
+  std::vector<std::string> hosts;   // names a Host field may have; empty: any
+  std::vector<AccessToken> tokens;  // who may come in (auth.h); empty: everybody
 };
 
 class Exchange {
  public:
   /// `elsewhere` answers what has no endpoint (the viewer's files).
-  Exchange(ExchangeRules rules, const Handlers& handlers, const Handler& elsewhere, Gate& uploads, HttpMetrics& metrics,
-           LogLine log);
+  Exchange(ExchangeRules rules, Service& service, const Handlers& handlers, const Handler& elsewhere, Gate& uploads,
+           HttpMetrics& metrics, LogLine log);
 
   /// Serves one request. True when its bytes were read to the end.
   bool serve(Connection&, std::string_view head, const std::string& peer);
@@ -32,10 +33,13 @@ class Exchange {
 
  private:
   Reply dispatch(const Endpoint*, const Handler&, Request&);
-  Answer<void> check(const Head&, const Endpoint*) const;
+  Answer<void> check_body(const Head&, const Endpoint&) const;
+  Answer<Visitor*> check_token(const Head&, const Endpoint*) const;
   Answer<void> check_origin(const Head&) const;
 
   ExchangeRules rules_;
+  Service& service_;
+  Visitors visitors_;
   Gate& uploads_;
   HttpMetrics& metrics_;
   LogLine log_;

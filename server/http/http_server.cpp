@@ -72,7 +72,7 @@ struct HttpServer::State {
         streams(options.max_streams),
         downloads(options.max_downloads),
         context{s, streams, downloads, draining, options.heartbeat, [this] { return metrics_text(); }},
-        exchange({options.max_upload_bytes, options.hosts, options.token_hashes}, all_routes(context), viewer_file,
+        exchange({options.max_upload_bytes, options.hosts, options.tokens}, s, all_routes(context), viewer_file,
                  uploads, metrics, options.log),
         front(
             front_options(options),

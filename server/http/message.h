@@ -18,6 +18,8 @@
 
 namespace kiln {
 
+class Service;
+
 struct Field {
   std::string name;  // lower case
   std::string value;
@@ -75,10 +77,11 @@ struct Request {
   Head head;
   std::vector<std::pair<std::string, std::string>> path_params;  // {id} of the route, in order
   BodySource* body = nullptr;
-  Sink* client = nullptr;  // for client_gone() while waiting
-  Pass upload;             // the place among the uploads; a handler that has read the body may leave it
-  std::string id;          // X-Request-Id
-  std::string peer;        // address
+  Sink* client = nullptr;      // for client_gone() while waiting
+  Pass upload;                 // the place among the uploads; a handler that has read the body may leave it
+  std::string id;              // X-Request-Id
+  std::string peer;            // address
+  Service* service = nullptr;  // what of the service the one who asks may see
 };
 
 /// The value of a path parameter that the route has.

@@ -48,6 +48,8 @@ void service_families(std::string& text, const MetricsInput& in) {
          {{"", s.claim_latency_s_sum}});
   family(text, "retries_total", "counter", "Attempts that will be repeated.", {{"", real(s.retried)}});
   family(text, "reaped_total", "counter", "Leases that ended without a word.", {{"", real(s.reaped)}});
+  family(text, "lost_leases_total", "counter", "Jobs given up here because their lease was lost or unanswered.",
+         {{"", real(s.lost_leases)}});
   family(text, "stale_commits_total", "counter", "Results refused because their claim was lost.",
          {{"", real(s.stale_commits)}});
   family(text, "worker_deaths_total", "counter", "Workers that did not end by themselves, by cause.",

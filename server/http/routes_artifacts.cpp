@@ -8,8 +8,8 @@ namespace {
 
 Reply busy() { return problem_reply(make_problem("overloaded", "too many downloads at once; try again in a moment")); }
 
-Reply list_artifacts(RouteContext& context, Request& request) {
-  auto job = context.service.get(path_param(request, "id"));
+Reply list_artifacts(RouteContext&, Request& request) {
+  auto job = request.service->get(path_param(request, "id"));
   if (!job) return fault_reply(job.error());
   return json_reply(200, artifact_list_json(job->id, job_reply(*job).artifacts));
 }
@@ -20,7 +20,7 @@ Reply get_artifact(RouteContext& context, Request& request) {
   const std::string& id = path_param(request, "id");
   Pass pass = context.downloads.enter();
   if (!pass) return busy();
-  auto open = context.service.open_artifact(id, path_param(request, "name"));
+  auto open = request.service->open_artifact(id, path_param(request, "name"));
   if (!open) return fault_reply(open.error());
   BlobReply how;
   how.media_type = safe_media_type(open->artifact.name);
@@ -58,7 +58,7 @@ Reply tar_reply(const Job& job, std::vector<OpenArtifact> opened, Pass pass) {
 }
 
 Reply get_bundle(RouteContext& context, Request& request) {
-  auto job = context.service.get(path_param(request, "id"));
+  auto job = request.service->get(path_param(request, "id"));
   if (!job) return fault_reply(job.error());
   if (job->artifacts.empty())
     return problem_reply(make_problem("no_artifacts", "this job has no files (yet): only a succeeded one has"));
@@ -66,7 +66,7 @@ Reply get_bundle(RouteContext& context, Request& request) {
   if (!pass) return busy();
   std::vector<OpenArtifact> files;
   for (const Artifact& artifact : job->artifacts) {
-    auto open = context.service.open_artifact(job->id, artifact.name);
+    auto open = request.service->open_artifact(job->id, artifact.name);
     if (!open) return fault_reply(open.error());
     files.push_back(std::move(*open));
   }

@@ -83,20 +83,20 @@ Reply store_piece(Service& service, Request& request, const std::string& sha256,
   return stored ? asset_reply(*stored) : fault_reply(stored.error());
 }
 
-Reply put_asset(RouteContext& context, Request& request) {
+Reply put_asset(RouteContext&, Request& request) {
   const std::string& sha256 = path_param(request, "sha256");
   if (!is_sha256(sha256)) return problem_reply(bad_name(sha256));
   auto piece = asked_piece(request);
   if (!piece) return problem_reply(piece.error());
-  if (context.service.has_asset(sha256)) return known_asset(context.service, request, sha256);
-  return store_piece(context.service, request, sha256, *piece);
+  if (request.service->has_asset(sha256, std::nullopt)) return known_asset(*request.service, request, sha256);
+  return store_piece(*request.service, request, sha256, *piece);
 }
 
-Reply post_asset(RouteContext& context, Request& request) {
+Reply post_asset(RouteContext&, Request& request) {
   AssetRequest asset;
   asset.expected = request.body->length();
   auto stored =
-      store_asset(context.service, asset, [&](std::span<std::uint8_t> out) { return request.body->read(out); });
+      store_asset(*request.service, asset, [&](std::span<std::uint8_t> out) { return request.body->read(out); });
   return stored ? asset_reply(*stored) : problem_reply(stored.error());
 }
 
@@ -105,9 +105,9 @@ Reply get_asset(RouteContext& context, Request& request) {
   if (!is_sha256(sha256)) return problem_reply(bad_name(sha256));
   Pass pass = context.downloads.enter();
   if (!pass) return problem_reply(make_problem("overloaded", "too many downloads at once; try again in a moment"));
-  if (!context.service.has_asset(sha256))
-    return with_offset(problem_reply(make_problem("not_found", "there is no such asset")), context.service, sha256);
-  auto reader = context.service.open_asset(sha256);
+  if (!request.service->has_asset(sha256, std::nullopt))
+    return with_offset(problem_reply(make_problem("not_found", "there is no such asset")), *request.service, sha256);
+  auto reader = request.service->open_asset(sha256);
   if (!reader) return fault_reply(reader.error());
   return serve_blob(request.head, std::move(*reader), {"application/octet-stream", sha256, sha256, std::move(pass)});
 }

@@ -81,10 +81,10 @@ Reply stream_reply(RouteContext& context, Pass pass, std::shared_ptr<EventStream
 }
 
 /// `id` empty: all jobs.
-Reply open_stream(RouteContext& context, const std::string& id, std::optional<std::uint64_t> after) {
+Reply open_stream(RouteContext& context, Request& request, const std::string& id, std::optional<std::uint64_t> after) {
   Pass pass = context.streams.enter();
   if (!pass) return problem_reply(make_problem("overloaded", "too many event streams are open; try again in a moment"));
-  auto events = context.service.subscribe(id, after);
+  auto events = request.service->subscribe(id, after);
   if (!events) return fault_reply(events.error());
   return stream_reply(context, std::move(pass), std::move(*events), !id.empty());
 }
@@ -93,20 +93,20 @@ Reply job_events(RouteContext& context, Request& request) {
   const std::string& id = path_param(request, "id");
   auto after = last_seen(request);
   if (!after) return problem_reply(after.error());
-  auto job = context.service.get(id);
+  auto job = request.service->get(id);
   if (!job) return fault_reply(job.error());
   if (is_terminal(job->state) && *after && **after >= job->version) {
     Reply over;  // 204 tells an EventSource not to come back
     over.status = 204;
     return over;
   }
-  return open_stream(context, id, after->value_or(0));
+  return open_stream(context, request, id, after->value_or(0));
 }
 
 Reply all_events(RouteContext& context, Request& request) {
   auto after = last_seen(request);
   if (!after) return problem_reply(after.error());
-  return open_stream(context, {}, *after);
+  return open_stream(context, request, {}, *after);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ Result<Job> wait_for(RouteContext& context, Request& request, const std::string&
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
   while (true) {
     const auto left = std::chrono::duration_cast<Millis>(end - std::chrono::steady_clock::now());
-    auto job = context.service.wait_done(id, std::clamp(left, Millis{0}, kWaitSlice));
+    auto job = request.service->wait_done(id, std::clamp(left, Millis{0}, kWaitSlice));
     if (!job || is_terminal(job->state) || left <= kWaitSlice || context.draining || request.client->client_gone())
       return job;
   }
@@ -47,15 +47,15 @@ Reply create_job(RouteContext& context, Request& request) {
   if (!key.empty() && !is_idempotency_key(key))
     return problem_reply(make_problem("bad_header", "Idempotency-Key must be 1 to 255 visible ASCII characters"));
   if (context.draining) return problem_reply(make_problem("draining", "the server is shutting down"));
-  auto submission = read_submission(request, context.service);
+  auto submission = read_submission(request, *request.service);
   if (!submission) return problem_reply(submission.error());
   submission->idempotency_key = key;
-  auto created = context.service.submit(*submission);
+  auto created = request.service->submit(*submission);
   if (!created) return fault_reply(created.error());
   return created_reply(context, request, *created, prefer_wait(field_of(request.head, "prefer")).value_or(0));
 }
 
-Reply list_jobs(RouteContext& context, Request& request) {
+Reply list_jobs(RouteContext&, Request& request) {
   auto asked = parse_list_request(request.head.params);
   if (!asked) return problem_reply(asked.error());
   JobQuery query;
@@ -63,7 +63,7 @@ Reply list_jobs(RouteContext& context, Request& request) {
   if (!asked->label.empty()) query.label = asked->label;
   query.limit = asked->limit;
   query.cursor = asked->cursor;
-  auto page = context.service.list(query);
+  auto page = request.service->list(query);
   if (!page) return fault_reply(page.error());
   JobListReply reply;
   for (const Job& job : page->jobs) reply.jobs.push_back(job_reply(job));
@@ -79,17 +79,17 @@ Reply get_job(RouteContext& context, Request& request) {
   const std::string& id = path_param(request, "id");
   const Pass pass = *wait > 0 ? context.streams.enter() : nullptr;
   if (*wait > 0 && !pass) return overloaded();
-  auto job = *wait > 0 ? wait_for(context, request, id, *wait) : context.service.get(id);
+  auto job = *wait > 0 ? wait_for(context, request, id, *wait) : request.service->get(id);
   return job ? job_document(200, *job) : fault_reply(job.error());
 }
 
-Reply cancel_job(RouteContext& context, Request& request) {
-  auto job = context.service.cancel(path_param(request, "id"));
+Reply cancel_job(RouteContext&, Request& request) {
+  auto job = request.service->cancel(path_param(request, "id"));
   return job ? job_document(200, *job) : fault_reply(job.error());
 }
 
-Reply delete_job(RouteContext& context, Request& request) {
-  auto removed = context.service.remove(path_param(request, "id"));
+Reply delete_job(RouteContext&, Request& request) {
+  auto removed = request.service->remove(path_param(request, "id"));
   if (!removed) return fault_reply(removed.error());
   Reply reply;
   reply.status = 204;

@@ -10,10 +10,10 @@ namespace {
 
 using nlohmann::json;
 
-Reply plan_job(RouteContext& context, Request& request) {
-  auto submission = read_submission(request, context.service);
+Reply plan_job(RouteContext&, Request& request) {
+  auto submission = read_submission(request, *request.service);
   if (!submission) return problem_reply(submission.error());
-  auto plan = context.service.plan(*submission);
+  auto plan = request.service->plan(*submission);
   return plan ? json_reply(200, std::move(*plan)) : fault_reply(plan.error());
 }
 

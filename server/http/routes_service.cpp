@@ -13,10 +13,16 @@ using nlohmann::json;
 Reply health(Request&) { return json_reply(200, R"({"status":"ok"})"); }
 
 Reply readiness(RouteContext& context) {
-  std::vector<std::string> reasons = context.service.unready_reasons();
+  std::vector<std::string> reasons;
+  json checks = json::object();
+  for (const Check& check : context.service.checks()) {
+    checks[check.name] = check.state;
+    if (!check.ready) reasons.push_back(check.state);
+  }
   if (context.draining) reasons.emplace_back("the server is shutting down");
   const bool ready = reasons.empty();
-  Reply reply = json_reply(ready ? 200 : 503, json{{"ready", ready}, {"reasons", std::move(reasons)}}.dump());
+  Reply reply = json_reply(
+      ready ? 200 : 503, json{{"ready", ready}, {"reasons", std::move(reasons)}, {"checks", std::move(checks)}}.dump());
   if (!ready) reply.fields.push_back({"retry-after", "5"});
   return reply;
 }

@@ -57,6 +57,7 @@ struct JobError {
 struct Job {
   std::string id;  // ULID: 26 letters, sorts by creation time
   JobState state = JobState::queued;
+  std::string tenant;  // whose it is; empty where nobody is told apart
   std::string label;
   JobInputs inputs;
   std::string recipe;       // canonical JSON

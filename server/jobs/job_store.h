@@ -7,6 +7,7 @@
 // All times are the store's own clock. Every function may be called from any thread.
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,14 +22,16 @@ namespace kiln {
 using Millis = std::chrono::milliseconds;
 
 struct NewJob {
+  std::string tenant;
   std::string label;
   JobInputs inputs;
   std::string recipe;
   std::string content_key;
   bool force = false;           // do not answer from an earlier result
-  std::string idempotency_key;  // empty: none
+  std::string idempotency_key;  // the tenant's own; empty: none
   std::string request_hash;     // of the whole request; a key met again with another hash is refused
   int max_queued = 0;           // refuse with "queue_full" when so many wait already; 0: no limit
+  int max_open = 0;             // refuse with "quota" when the tenant has so many queued or running; 0: no limit
 };
 
 struct Created {
@@ -52,6 +55,7 @@ enum class Beat { ok, lost, cancel_requested };
 enum class Wrote { done, lost };  // lost: fenced off, canceled or gone; nothing was written
 
 struct JobQuery {
+  std::optional<std::string> tenant;
   std::optional<JobState> state;
   std::optional<std::string> label;
   int limit = 50;
@@ -76,18 +80,26 @@ struct StoreCounts {
   std::int64_t oldest_queued_ms = 0;  // creation time; 0 when nothing waits
 };
 
-/// Codes of faults: store_failed, disk_full (the database cannot grow), not_found, bad_cursor, queue_full,
-/// idempotency_mismatch, asset_not_found, poisoned (the same content crashed its worker twice within 24 h),
-/// not_terminal.
+/// Held from making a blob until a row refers to it, or alone while the bytes of forgotten blobs are removed: so that
+/// bytes which come again meanwhile are not taken away.
+class BlobGate {
+ public:
+  virtual ~BlobGate() = default;
+};
+
+/// Codes of faults: store_failed, store_unavailable (no connection to the database now: try again), disk_full (the
+/// database cannot grow), not_found, bad_cursor, queue_full, quota, idempotency_mismatch, asset_not_found, poisoned
+/// (the same content crashed its worker twice within 24 h), not_terminal.
 class JobStore {
  public:
   virtual ~JobStore() = default;
 
   /// Stores a job; at once `succeeded` and `cached` when content_key has a result and not `force`.
-  /// Every input must be a known blob (touch_blob).
+  /// Every input must be a blob that the tenant brought or baked (touch_blob, commit).
   virtual Result<Created> create(const NewJob&) = 0;
 
-  /// The oldest job that is due, now running under a lease; nothing when none is.
+  /// A job that is due, now running under a lease; nothing when none is. Of the tenant with the fewest running jobs,
+  /// the oldest.
   virtual Result<std::optional<Claim>> claim(Millis lease) = 0;
   virtual Result<Beat> heartbeat(const ClaimRef&, Millis lease, const std::optional<JobProgress>&) = 0;
   virtual Result<Wrote> commit(const ClaimRef&, std::span<const Artifact>, bool cached) = 0;
@@ -120,12 +132,26 @@ class JobStore {
   virtual Result<std::uint64_t> last_event_id() = 0;
   virtual Result<void> log(const std::string& job_id, const std::string& line) = 0;
 
-  /// Notes that a blob exists and was just referred to. Call after its file is durable.
-  virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes) = 0;
-  virtual Result<bool> knows_blob(const std::string& sha256) = 0;
+  /// Notes that a blob exists, that the tenant has it, and that it was just referred to. Call after it is durable.
+  virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant = {}) = 0;
+  /// Whether the tenant has the blob; without one: whether anybody has.
+  virtual Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant = {}) = 0;
   /// Forgets blobs that nothing refers to and nobody touched for `grace`, and returns them: their files may go now.
   virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace) = 0;
 
+  /// Among those who make blobs; waits while somebody removes some.
+  virtual Result<std::unique_ptr<BlobGate>> enter_blob_gate() = 0;
+  /// Alone. "gate_busy" when others stay too long: try again later.
+  virtual Result<std::unique_ptr<BlobGate>> close_blob_gate() = 0;
+
+  /// Other programs write to this store as well: only the end of a lease tells that a worker is gone.
+  virtual bool shared() const = 0;
+  /// `wake` is called soon after another program wrote. A hint that may get lost: look every few seconds all the same.
+  /// An empty one ends it: no call is under way when this returns.
+  virtual void on_change(std::function<void()> wake) = 0;
+
+  /// Who this store is, for ever: 32 hex digits, drawn when its tables were made.
+  virtual Result<std::string> identity() = 0;
   /// Writes and reads back one row: ready to serve.
   virtual Result<void> check_writable() = 0;
 };

@@ -92,6 +92,23 @@ CREATE TRIGGER job_event_is_append_only BEFORE UPDATE ON job_event
   BEGIN SELECT RAISE(ABORT, 'events are append-only'); END;
 )sql";
 
+// From version 1 to 2: tenants (what was there belongs to the one without a name), and who this store is.
+constexpr const char* kVersion2 = R"sql(
+ALTER TABLE job ADD COLUMN tenant TEXT NOT NULL DEFAULT '';
+CREATE INDEX job_by_tenant ON job(tenant, created_at, id);
+DROP INDEX job_running;
+CREATE INDEX job_running ON job(tenant) WHERE state = 'running';
+-- Who brought the blob or baked it: others cannot tell that it is there.
+CREATE TABLE blob_tenant(
+  sha256 TEXT NOT NULL REFERENCES blob(sha256) ON DELETE CASCADE,
+  tenant TEXT NOT NULL,
+  PRIMARY KEY(sha256, tenant)
+) STRICT;
+INSERT INTO blob_tenant SELECT sha256, '' FROM blob;
+CREATE TABLE identity(id TEXT NOT NULL) STRICT;
+INSERT INTO identity SELECT lower(hex(randomblob(16)));
+)sql";
+
 struct Setting {
   const char* set;
   const char* read;
@@ -116,13 +133,16 @@ constexpr std::array kReaderSettings{
     Setting{"PRAGMA mmap_size=0", "PRAGMA mmap_size", "0"},
 };
 
-Result<std::string> single_value(Database& db, const char* statement) {
+/// As text, which is what SQLite's pragmas are compared with.
+Result<std::string> single_value(SqliteConnection& db, const std::string& statement) {
   KILN_TRY(rows, db.query(statement));
-  KILN_TRY(found, rows.next());
-  return found ? rows.text(0) : std::string();
+  if (rows.empty()) return std::string();
+  const Row& row = rows.front();
+  const std::string text = row.text(0);
+  return text.empty() && !row.is_null(0) ? std::to_string(row.integer(0)) : text;
 }
 
-Result<void> apply_settings(Database& db, std::span<const Setting> settings) {
+Result<void> apply_settings(SqliteConnection& db, std::span<const Setting> settings) {
   for (const Setting& setting : settings) {
     KILN_DO(db.execute(setting.set));
     KILN_TRY(value, single_value(db, setting.read));
@@ -147,12 +167,13 @@ Result<void> refuse_network_files(const std::filesystem::path& file) {
   return {};
 }
 
-Result<void> make_tables(Database& db) {
+Result<void> make_tables(SqliteConnection& db) {
   KILN_TRY(transaction, Transaction::begin(db));
   KILN_TRY(version, single_value(db, "PRAGMA user_version"));
-  if (version == "0") {
-    KILN_DO(db.execute(kTables));
-    KILN_DO(db.execute(("PRAGMA user_version=" + std::to_string(kSchemaVersion)).c_str()));
+  if (version == "0") KILN_DO(db.execute(kTables));
+  if (version == "0" || version == "1") {
+    KILN_DO(db.execute(kVersion2));
+    KILN_DO(db.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion)));
   } else if (version != std::to_string(kSchemaVersion)) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +
                                        ", this one knows " + std::to_string(kSchemaVersion) + ")");
@@ -162,19 +183,19 @@ Result<void> make_tables(Database& db) {
 
 }  // namespace
 
-Result<Database> open_writer(const std::filesystem::path& file) {
+Result<std::unique_ptr<SqliteConnection>> open_writer(const std::filesystem::path& file, const Clock& now_ms) {
   KILN_DO(refuse_network_files(file));
-  KILN_TRY(db, Database::open(file, Database::Mode::read_write));
-  KILN_DO(apply_settings(db, kWriterSettings));
-  KILN_TRY(state, single_value(db, "PRAGMA quick_check(1)"));
+  KILN_TRY(db, SqliteConnection::open(file, SqliteConnection::Mode::read_write, now_ms));
+  KILN_DO(apply_settings(*db, kWriterSettings));
+  KILN_TRY(state, single_value(*db, "PRAGMA quick_check(1)"));
   if (state != "ok") return fault("store_damaged", "the job store is damaged (quick_check failed)");
-  KILN_DO(make_tables(db));
+  KILN_DO(make_tables(*db));
   return db;
 }
 
-Result<Database> open_reader(const std::filesystem::path& file) {
-  KILN_TRY(db, Database::open(file, Database::Mode::read_only));
-  KILN_DO(apply_settings(db, kReaderSettings));
+Result<std::unique_ptr<SqliteConnection>> open_reader(const std::filesystem::path& file, const Clock& now_ms) {
+  KILN_TRY(db, SqliteConnection::open(file, SqliteConnection::Mode::read_only, now_ms));
+  KILN_DO(apply_settings(*db, kReaderSettings));
   return db;
 }
 

@@ -7,12 +7,13 @@
 
 namespace kiln::sql {
 
-inline constexpr int kSchemaVersion = 1;
+inline constexpr int kSchemaVersion = 2;
+using Clock = std::function<std::int64_t()>;
 
 /// The one connection that writes: settings verified, file checked, tables there.
-Result<Database> open_writer(const std::filesystem::path& file);
+Result<std::unique_ptr<SqliteConnection>> open_writer(const std::filesystem::path& file, const Clock& now_ms);
 
 /// A connection that only reads and never touches the write-ahead log's life.
-Result<Database> open_reader(const std::filesystem::path& file);
+Result<std::unique_ptr<SqliteConnection>> open_reader(const std::filesystem::path& file, const Clock& now_ms);
 
 }  // namespace kiln::sql

@@ -18,4 +18,8 @@ struct SqliteOptions {
 /// Refuses a schema newer than this program ("schema_too_new").
 Result<std::unique_ptr<JobStore>> open_sqlite_store(const SqliteOptions&);
 
+/// Copies the database as it is at one moment into a new file; its server may go on writing. Fails with store_failed,
+/// disk_full, and not_found when there is no database.
+Result<void> backup_sqlite_store(const std::filesystem::path& file, const std::filesystem::path& target);
+
 }  // namespace kiln

@@ -1,4 +1,5 @@
-// kilnd: serves HTTP and supervises its workers. `kilnd bake-worker FOLDER` is such a worker.
+// kilnd: serves HTTP and supervises its workers. `kilnd worker` only does the latter, for a fleet. `kilnd bake-worker
+// FOLDER` is such a worker. `kilnd admin` looks after the store.
 
 #include <signal.h>
 
@@ -10,6 +11,7 @@
 #include "server/http/auth.h"
 #include "server/http/http_server.h"
 #include "server/kilnd/options.h"
+#include "server/work/admin.h"
 #include "server/work/bake_worker.h"
 #include "server/work/sandbox.h"
 #include "server/work/service.h"
@@ -20,8 +22,11 @@ namespace {
 
 int complain(const Fault& fault) {
   std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
-  const bool config = fault.code == "data_in_use" || fault.code == "schema_too_new" || fault.code == "bad_token_file";
-  return config ? kExitConfig : 1;
+  for (const char* config :
+       {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused", "blobs_of_another"}) {
+    if (fault.code == config) return kExitConfig;
+  }
+  return 1;
 }
 
 sigset_t end_signals() {
@@ -51,13 +56,8 @@ Result<HttpOptions> http_options(const DaemonOptions& options) {
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
   if (!options.token_file.empty()) {
-    auto hashes = read_token_hashes(options.token_file);
-    if (!hashes) return tl::make_unexpected(hashes.error());
-    http.token_hashes = std::move(*hashes);
-  }
-  if (!options.token_file.empty()) {
-    KILN_TRY(hashes, read_token_hashes(options.token_file));
-    http.token_hashes = std::move(hashes);
+    KILN_TRY(tokens, read_tokens(options.token_file));
+    http.tokens = std::move(tokens);
   }
   return http;
 }
@@ -76,6 +76,34 @@ bool check_sandbox(bool required) {
   return !required;
 }
 
+/// A worker of a fleet: the service without a door.
+int work(Service& service) {
+  service.start();
+  std::fprintf(stderr, "kilnd works for its fleet\n");
+  const sigset_t ends = end_signals();
+  int received = 0;
+  ::sigwait(&ends, &received);
+  service.drain();
+  return 0;
+}
+
+Result<std::string> admin_answer(const DaemonOptions& options, bool& sound) {
+  if (options.admin == "stats") return admin_stats(options.service);
+  if (options.admin == "gc") return admin_gc(options.service);
+  if (options.admin == "backup") return admin_backup(options.service, options.admin_folder);
+  KILN_TRY(scrub, admin_scrub(options.service));
+  sound = scrub.sound;
+  return scrub.json;
+}
+
+int administer(const DaemonOptions& options) {
+  bool sound = true;
+  const auto answer = admin_answer(options, sound);
+  if (!answer) return complain(answer.error());
+  std::printf("%s\n", answer->c_str());
+  return sound ? 0 : 1;
+}
+
 int serve(const DaemonOptions& options) {
   if (!check_sandbox(options.service.require_sandbox)) return kExitConfig;
   const sigset_t ends = end_signals();
@@ -85,6 +113,7 @@ int serve(const DaemonOptions& options) {
   if (!http) return complain(http.error());
   auto service = Service::open(options.service);
   if (!service) return complain(service.error());
+  if (options.worker_only) return work(**service);
   HttpServer server(*http, **service);
   const auto port = server.bind();
   if (!port) return complain(port.error());
@@ -104,5 +133,6 @@ int main(int argc, char** argv) {
   // A worker leaves without unwinding: its results are on disk and its memory goes faster in one piece.
   if (argc > 1 && std::string_view(argv[1]) == kWorkerWord) std::_Exit(bake_worker_main(argc - 1, argv + 1));
   const auto options = parse_options(argc, argv);
-  return options ? serve(*options) : options.error().code;
+  if (!options) return options.error().code;
+  return options->admin.empty() ? serve(*options) : administer(*options);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <cstdlib>
 
 #include "core/bake/bake.h"
 
@@ -26,11 +27,17 @@ CLI::Option* add(CLI::App& app, const std::string& flag, T& value, const std::st
 /// Values that have no member of their own type in ServiceOptions.
 struct RawOptions {
   std::string data = "kiln-data", worker_command;
-  double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10;
+  double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10, lease_s = 60;
 };
 
 void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
-  add(app, "--data", raw.data, "folder of jobs and blobs; made when missing");
+  add(app, "--data", raw.data, "folder of this server, with its jobs and blobs unless they live elsewhere");
+  add(app, "--store", options.service.stores.jobs,
+      "postgresql://user@host/database: jobs of a fleet (password: PGPASSWORD, a passfile, or KILN_STORE)");
+  add(app, "--blobs", options.service.stores.blobs, "dir:/shared or s3://bucket: blobs of a fleet");
+  add(app, "--s3-endpoint", options.service.stores.s3_endpoint,
+      "https://host[:port] of s3:// (key: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY)");
+  add(app, "--s3-region", options.service.stores.s3_region, "region that requests are signed for");
   add(app, "--bind", options.address, "numeric address to listen on; all but loopback need --token-file");
   add(app, "--port", options.port, "port to listen on; 0 picks a free one")->check(CLI::Range(0, 65535));
   add(app, "--workers", options.service.workers, "jobs at a time, each in a process of its own")
@@ -45,6 +52,9 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   add(app, "--hard-free-percent", raw.hard_percent, "less free disk than this lets the queue wait")
       ->check(CLI::Range(0.0, 100.0));
   add(app, "--blob-grace-s", raw.blob_grace_s, "how long an unused asset is kept")->check(CLI::NonNegativeNumber);
+  add(app, "--lease-s", raw.lease_s,
+      "a job whose server is silent for so long goes to another; the same in all of a fleet")
+      ->check(CLI::Range(1.0, 3600.0));
   add(app, "--first-retry-s", raw.first_retry_s, "pause after trouble of the machine, four times longer each time")
       ->check(CLI::NonNegativeNumber);
   add(app, "--worker-command", raw.worker_command, "another program as worker, for tests")->group("");
@@ -55,12 +65,31 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   app.set_version_flag("--version", std::string("kilnd ") + kEngineVersion);
 }
 
+std::string from_environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+tl::unexpected<EarlyExit> refuse(const std::string& why) {
+  std::fprintf(stderr, "kilnd: %s\n", why.c_str());
+  return tl::make_unexpected(EarlyExit{kExitConfig});
+}
+
+/// True when the address with a password came by the command line, where everyone sees it.
+bool tells_password(const StoreOptions& stores, int argc, const char* const* argv) {
+  const auto holds = [&](std::string_view word) { return word.find(stores.jobs) != std::string_view::npos; };
+  return holds_password(stores) && std::any_of(argv, argv + argc, holds);
+}
+
 void finish(DaemonOptions& options, const RawOptions& raw) {
   options.service.data = raw.data;
+  options.service.stores.s3_key = from_environment("AWS_ACCESS_KEY_ID");
+  options.service.stores.s3_secret = from_environment("AWS_SECRET_ACCESS_KEY");
   if (!raw.worker_command.empty()) options.service.worker_command = {raw.worker_command};
   options.service.soft_free_fraction = raw.soft_percent / 100;
   options.service.hard_free_fraction = raw.hard_percent / 100;
   options.service.blob_grace = Millis(static_cast<std::int64_t>(raw.blob_grace_s * 1000));
+  options.service.lease = Millis(static_cast<std::int64_t>(raw.lease_s * 1000));
   options.service.first_retry = Millis(static_cast<std::int64_t>(raw.first_retry_s * 1000));
 }
 
@@ -73,15 +102,33 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   DaemonOptions options;
   RawOptions raw;
   add_options(app, options, raw);
+  app.fallthrough();
+  const CLI::App* worker = app.add_subcommand("worker", "bake for a fleet, without an HTTP server");
+  CLI::App* admin = app.add_subcommand("admin", "look after a store and end; prints a line of JSON");
+  admin->add_option("what", options.admin, "stats, gc, scrub, or backup")
+      ->required()
+      ->check(CLI::IsMember({"stats", "gc", "scrub", "backup"}));
+  admin->add_option("folder", options.admin_folder, "a new folder for the backup");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return tl::make_unexpected(EarlyExit{app.exit(error) == 0 ? 0 : kExitUsage});
   }
   finish(options, raw);
-  if (!is_loopback(options.address) && options.token_file.empty()) {
-    std::fprintf(stderr, "kilnd: --bind %s is open to others: give --token-file as well\n", options.address.c_str());
-    return tl::make_unexpected(EarlyExit{kExitConfig});
+  options.worker_only = worker->parsed();
+  if (const auto sound = check_addresses(options.service.stores); !sound) return refuse(sound.error().message);
+  if (tells_password(options.service.stores, argc, argv)) {
+    return refuse("a password on the command line is seen by all: use PGPASSWORD, a passfile, or KILN_STORE");
+  }
+  if ((options.admin == "backup") == options.admin_folder.empty()) {
+    std::fprintf(stderr, "kilnd: admin backup wants a folder, and nothing else does\n");
+    return tl::make_unexpected(EarlyExit{kExitUsage});
+  }
+  if (options.worker_only && options.service.stores.jobs.empty()) {
+    return refuse("a worker without --store postgresql://... has nobody to bake for");
+  }
+  if (!options.worker_only && options.admin.empty() && !is_loopback(options.address) && options.token_file.empty()) {
+    return refuse("--bind " + options.address + " is open to others: give --token-file as well");
   }
   return options;
 }

@@ -1,5 +1,6 @@
 #pragma once
-// The command line of kilnd. Every flag is also an environment variable: --max-upload-mb is KILN_MAX_UPLOAD_MB.
+// The command line of kilnd. Every flag is also an environment variable: --max-upload-mb is KILN_MAX_UPLOAD_MB. Secrets
+// are environment variables alone, since everyone on a machine sees command lines.
 
 #include <cstdint>
 #include <optional>
@@ -15,7 +16,10 @@ struct DaemonOptions {
   int port = 7878;  // 0: any free one
   std::string token_file;
   std::uint64_t max_upload_mb = 8192;
-  bool quiet = false;  // no line per request
+  bool quiet = false;        // no line per request
+  bool worker_only = false;  // `kilnd worker`: bakes for a fleet and serves nobody
+  std::string admin;         // `kilnd admin WHAT`: stats, gc, scrub or backup, and then the end
+  std::string admin_folder;  // of a backup
 };
 
 inline constexpr int kExitUsage = 2;

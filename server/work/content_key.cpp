@@ -13,11 +13,12 @@ void add(std::string& bytes, const std::string& text) { bytes += std::to_string(
 
 }  // namespace
 
-std::string content_key(const JobInputs& inputs, const Recipe& recipe) {
+std::string content_key(const std::string& tenant, const JobInputs& inputs, const Recipe& recipe) {
   std::vector<NamedBlob> resources = inputs.resources;
   std::ranges::sort(resources, {}, &NamedBlob::name);
 
   std::string bytes;
+  if (!tenant.empty()) add(bytes, "tenant " + tenant);
   add(bytes, kEngineVersion);
   add(bytes, inputs.scene.sha256);
   add(bytes, inputs.environment ? inputs.environment->sha256 : "");

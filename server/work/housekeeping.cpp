@@ -1,7 +1,6 @@
 #include "server/work/housekeeping.h"
 
 #include <algorithm>
-#include <filesystem>
 
 namespace kiln {
 namespace {
@@ -11,18 +10,17 @@ using Clock = std::chrono::steady_clock;
 constexpr Millis kReapEvery{5000};
 constexpr double kPartialAgeS = 24 * 3600;
 
-/// Files whose row never came to be. Their age is the file's own.
+/// Blobs whose row never came to be. Their age is the blob's own.
 Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
   std::vector<std::string> old;
-  const auto before = std::filesystem::file_time_type::clock::now() - grace;
-  place.blobs.for_each([&](const std::string& sha256, std::uint64_t) {
-    std::error_code gone;
-    const auto written = std::filesystem::last_write_time(place.blobs.path_of(sha256), gone);
-    if (!gone && written < before) old.push_back(sha256);
+  const double grace_s = std::chrono::duration<double>(grace).count();
+  const auto listed = place.blobs.for_each([&](const BlobEntry& blob) {
+    if (blob.age_s > grace_s) old.push_back(blob.sha256);
   });
+  if (!listed) return tl::make_unexpected(listed.error());
   int removed = 0;
   for (const std::string& sha256 : old) {
-    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(alone, place.store.close_blob_gate());
     KILN_TRY(known, place.store.knows_blob(sha256));
     if (!known && place.blobs.remove(sha256)) ++removed;
   }
@@ -35,7 +33,7 @@ Result<int> collect_unused_blobs(const WorkPlace& place, Millis grace) {
   int removed = 0;
   {
     // Reference and removal meet here: an upload of the same bytes waits, and then writes them anew.
-    const std::unique_lock alone(place.blob_gate);
+    KILN_TRY(alone, place.store.close_blob_gate());
     KILN_TRY(unused, place.store.forget_unused_blobs(grace));
     for (const std::string& sha256 : unused) {
       if (place.blobs.remove(sha256)) ++removed;
@@ -62,7 +60,8 @@ void Housekeeping::work() {
   const Millis collect_every = std::clamp(grace_ / 20, Millis(1000), Millis(600'000));
   auto collected = Clock::now();
   std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, std::min(kReapEvery, collect_every), [&] { return stopping_; })) {
+  const Millis reap_every = std::min(kReapEvery, place_.options.lease / 4);
+  while (!changed_.wait_for(lock, std::min(reap_every, collect_every), [&] { return stopping_; })) {
     lock.unlock();
     const bool collect = Clock::now() - collected >= collect_every;
     if (collect) collected = Clock::now();
@@ -82,6 +81,7 @@ void Housekeeping::tidy(bool collect) {
   if (!collect) return;
   static_cast<void>(collect_unused_blobs(place_, grace_));  // a store that cannot write now: the next round
   place_.blobs.expire_partials(kPartialAgeS);
+  place_.blobs.remove_dead_writers();
 }
 
 }  // namespace kiln

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
 #include <fstream>
+#include <mutex>
 #include <random>
 #include <sstream>
 #include <thread>
@@ -21,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Kind = WorkerOutcome::Kind;
 
-constexpr auto kStoreProgressEvery = std::chrono::seconds(5);
+constexpr Millis kStoreProgressEvery{5000};
 constexpr auto kShowProgressEvery = std::chrono::milliseconds(50);
 constexpr double kPlanWallS = 60;
 
@@ -54,12 +56,26 @@ std::uint64_t scene_bytes(const WorkFolder& folder) {
   return error ? 0 : bytes;
 }
 
-/// Progress and heartbeats of one run.
+/// Progress and heartbeats of one run, from the first byte of input that is fetched to the last of a result that is
+/// stored: a thread of its own, since either may take longer than a lease.
 class Pulse {
  public:
-  Pulse(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {}
+  Pulse(const Claim& claim, StopSignal& stop, const WorkPlace& place) : claim_(claim), stop_(stop), place_(place) {
+    thread_ = std::thread([this] { work(); });
+  }
+  Pulse(const Pulse&) = delete;
+  Pulse& operator=(const Pulse&) = delete;
+  ~Pulse() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+      changed_.notify_all();
+    }
+    thread_.join();
+  }
 
   void progress(const ProgressEvent& event) {
+    const std::lock_guard lock(mutex_);
     const auto now = Clock::now();
     const bool new_stage = event.stage != newest_.stage;
     newest_ = {event.stage, event.done, event.total, std::max(newest_.fraction, event.fraction), {}, event.error};
@@ -70,29 +86,40 @@ class Pulse {
     place_.bus.announce_progress(claim_.ref.job_id, newest_);
   }
 
-  void tick() {
-    const auto now = Clock::now();
-    if (now - beaten_ < kStoreProgressEvery) return;
-    beaten_ = now;
-    const auto beat = place_.store.heartbeat(claim_.ref, kLease, newest_);
-    if (!beat) return;  // the lease still holds for a while: try again
-    if (*beat == Beat::lost) stop_.ask(StopReason::lost);
-    if (*beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
+ private:
+  void work() {
+    const Millis lease = place_.options.lease;
+    auto answered = Clock::now();
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, std::min(kStoreProgressEvery, lease / 4), [&] { return over_; })) {
+      const JobProgress newest = newest_;
+      lock.unlock();
+      const auto beat = place_.store.heartbeat(claim_.ref, lease, newest);
+      if (beat) answered = Clock::now();
+      // Without an answer the job is given up before the store gives it to another.
+      const bool too_late = !beat && Clock::now() - answered > lease * 3 / 4;
+      if (too_late || (beat && *beat == Beat::lost)) stop_.ask(StopReason::lost);
+      if (beat && *beat == Beat::cancel_requested) stop_.ask(StopReason::cancel);
+      lock.lock();
+    }
   }
 
- private:
   const Claim& claim_;
   StopSignal& stop_;
   const WorkPlace& place_;
   const Clock::time_point started_ = Clock::now();
-  Clock::time_point shown_{}, beaten_ = Clock::now();
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool over_ = false;
+  Clock::time_point shown_{};
   JobProgress newest_;
+  std::thread thread_;
 };
 
 /// Tries again while the store cannot write, as long as the claim may hold; the queue waits meanwhile.
 template <class Write>
-Result<Wrote> persist(const StopSignal& stop, Write&& write) {
-  const auto deadline = Clock::now() + kLease;
+Result<Wrote> persist(const StopSignal& stop, Millis lease, Write&& write) {
+  const auto deadline = Clock::now() + lease;
   for (Millis pause{100};; pause = std::min(pause * 2, Millis(2000))) {
     Result<Wrote> wrote = write();
     if (wrote || Clock::now() > deadline || stop.asked() == StopReason::drain) return wrote;
@@ -125,21 +152,21 @@ class JobRun {
   void conclude() {
     const auto limits = limits_of(claim_.job.recipe);
     if (!limits) return fail({limits.error(), 500});
+    Pulse pulse(claim_, stop_, place_);
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
     WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
     order.checkpoint = checkpoint_.load();
     const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
-    end_as(bake(*folder, *limits), *folder);
+    end_as(bake(*folder, *limits, pulse), *folder);
   }
 
-  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits) {
-    Pulse pulse(claim_, stop_, place_);
+  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits, Pulse& pulse) {
     const std::uint64_t memory = limits.memory_mb << 20;
     return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder)},
                       {memory, limits.wall_s}, stop_,
                       {[&](const ProgressEvent& event) { pulse.progress(event); },
-                       [&](const std::string& text) { checkpoint_.save(text); }, [&] { pulse.tick(); }});
+                       [&](const std::string& text) { checkpoint_.save(text); }});
   }
 
   void end_as(const WorkerOutcome& outcome, const WorkFolder& folder) {
@@ -166,7 +193,8 @@ class JobRun {
   }
 
   void store_results(const WorkerOutcome& outcome, const WorkFolder& folder) {
-    const std::shared_lock gate(place_.blob_gate);
+    const auto gate = place_.store.enter_blob_gate();
+    if (!gate) return after_trouble(gate.error());
     std::vector<std::filesystem::path> files;
     for (const WorkerArtifact& named : outcome.artifacts) files.push_back(folder.result(named.name));
     const auto stored = place_.blobs.adopt(files);
@@ -184,20 +212,25 @@ class JobRun {
   }
 
   void succeed(const std::vector<Artifact>& artifacts, bool cached) {
-    if (!wrote(persist(stop_, [&] { return place_.store.commit(claim_.ref, artifacts, cached); }))) return;
+    if (!wrote(
+            persist(stop_, place_.options.lease, [&] { return place_.store.commit(claim_.ref, artifacts, cached); })))
+      return;
     checkpoint_.remove();
     ++place_.counters.succeeded;
     if (cached) ++place_.counters.cached;
   }
 
   void fail(const JobError& error) {
-    if (!wrote(persist(stop_, [&] { return place_.store.fail(claim_.ref, error); }))) return;
+    if (!wrote(persist(stop_, place_.options.lease, [&] { return place_.store.fail(claim_.ref, error); }))) return;
     checkpoint_.remove();
     ++place_.counters.failed;
   }
 
   void after_stop() {
-    if (stop_.asked() == StopReason::lost) return;
+    if (stop_.asked() == StopReason::lost) {
+      ++place_.counters.lost_leases;
+      return;
+    }
     if (stop_.asked() == StopReason::drain) {
       static_cast<void>(wrote(place_.store.release(claim_.ref)));  // else the next start finds and requeues it
     } else {
@@ -221,7 +254,8 @@ class JobRun {
   }
 
   void retry(const Retry& how) {
-    if (wrote(persist(stop_, [&] { return place_.store.retry(claim_.ref, how); }))) ++place_.counters.retried;
+    if (wrote(persist(stop_, place_.options.lease, [&] { return place_.store.retry(claim_.ref, how); })))
+      ++place_.counters.retried;
   }
 
   /// False when nothing was written: canceled meanwhile, fenced off, or the store is out of order.
@@ -232,7 +266,7 @@ class JobRun {
   }
 
   void finish_cancel() {
-    const auto ended = persist(stop_, [&] { return place_.store.finish_cancel(claim_.ref); });
+    const auto ended = persist(stop_, place_.options.lease, [&] { return place_.store.finish_cancel(claim_.ref); });
     if (!ended) return;
     checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);

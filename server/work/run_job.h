@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <filesystem>
-#include <shared_mutex>
 #include <string>
 #include <vector>
 
@@ -16,7 +15,7 @@ namespace kiln {
 
 struct WorkCounters {
   std::atomic<std::uint64_t> claimed{0}, succeeded{0}, failed{0}, canceled{0}, cached{0};
-  std::atomic<std::uint64_t> retried{0}, reaped{0}, stale_commits{0};
+  std::atomic<std::uint64_t> retried{0}, reaped{0}, lost_leases{0}, stale_commits{0};
   std::atomic<std::uint64_t> deaths_signal{0}, deaths_memory{0}, deaths_timeout{0};
   std::atomic<std::uint64_t> bytes_uploaded{0};
   std::atomic<std::int64_t> claim_latency_ms{0};
@@ -28,21 +27,19 @@ struct WorkOptions {
   std::vector<std::string> worker_command;  // see WorkerStart
   int threads = 1;                          // when the recipe does not say
   Millis first_retry{10'000};
+  Millis lease{60'000};  // how long the store waits for a word of a running job's server
   bool require_sandbox = false;
 };
 
-/// What all of the work shares. `blob_gate`: held shared from making a blob until a row refers to it, and alone while
-/// unused blobs are removed.
+/// What all of the work shares.
 struct WorkPlace {
   JobStore& store;
   BlobStore& blobs;
   EventBus& bus;
-  std::shared_mutex& blob_gate;
   WorkCounters& counters;
   const WorkOptions& options;
 };
 
-inline constexpr Millis kLease{60'000};
 inline constexpr int kMaxRetries = 5;  // after trouble of the machine
 inline constexpr int kMaxCrashes = 2;  // the second crash is the input's own
 

@@ -40,7 +40,6 @@ class Watch {
       }
       check_limits();
       press();
-      if (news_.tick) news_.tick();
     }
   }
 

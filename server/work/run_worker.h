@@ -53,7 +53,6 @@ struct WorkerOutcome {
 struct WorkerNews {
   std::function<void(const ProgressEvent&)> progress;
   std::function<void(const std::string&)> checkpoint;
-  std::function<void()> tick;  // at least every 0.25 s
 };
 
 /// Blocks until the process is gone. Never throws, whatever the worker does.

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <atomic>
-#include <shared_mutex>
 #include <thread>
 
 #include "core/base/sha256.h"
-#include "server/jobs/sqlite_store.h"
 #include "server/work/checkpoint_file.h"
 #include "server/work/content_key.h"
 #include "server/work/data_folder.h"
 #include "server/work/event_stream.h"
 #include "server/work/housekeeping.h"
+#include "server/work/neighbours.h"
+#include "server/work/sandbox.h"
 #include "server/work/supervisor.h"
 #include "server/work/work_folder.h"
 
@@ -71,6 +71,7 @@ class LocalService final : public Service {
   void start() override {
     supervisor_.start();
     housekeeping_.start();
+    neighbours_.start();
   }
   void drain() override;
 
@@ -93,20 +94,21 @@ class LocalService final : public Service {
 
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
-  bool has_asset(const std::string& sha256) override;
+  bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
 
   ServiceStats stats() override;
-  std::vector<std::string> unready_reasons() override;
+  std::vector<Check> checks() override;
 
  private:
   friend class LocalUpload;
   template <class Condition>
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
-  bool may_claim() const { return disk_space(options_.data).free_fraction >= options_.hard_free_fraction; }
-  WorkPlace place() { return {*store_, *blobs_, bus_, blob_gate_, counters_, work_options_}; }
+  bool may_claim() const { return disk().free_fraction >= options_.hard_free_fraction; }
+  DiskSpace disk() const;
+  WorkPlace place() { return {*store_, *blobs_, bus_, counters_, work_options_}; }
   WorkOptions work_options() const;
 
   const ServiceOptions options_;
@@ -114,25 +116,26 @@ class LocalService final : public Service {
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;
   EventBus bus_;
-  std::shared_mutex blob_gate_;
   WorkCounters counters_;
   const WorkOptions work_options_ = work_options();
   StopSignal plans_stop_;
   std::atomic<int> plans_{0};
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), options_.blob_grace};
+  Neighbours neighbours_{place(), supervisor_};
 };
 
 class LocalUpload final : public AssetUpload {
  public:
-  LocalUpload(LocalService& service, BlobWriter writer) : service_(&service), writer_(std::move(writer)) {}
+  LocalUpload(LocalService& service, BlobWriter writer, std::string tenant)
+      : service_(&service), writer_(std::move(writer)), tenant_(std::move(tenant)) {}
 
   Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
   std::uint64_t bytes() const override { return writer_.bytes(); }
   Result<StoredBlob> finish() override {
-    const std::shared_lock gate(service_->blob_gate_);
+    KILN_TRY(gate, service_->store_->enter_blob_gate());
     KILN_TRY(stored, writer_.finish());
-    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes);
+    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes, tenant_);
     if (!noted) return tl::make_unexpected(noted.error());
     service_->counters_.bytes_uploaded += stored.bytes;
     return stored;
@@ -141,17 +144,19 @@ class LocalUpload final : public AssetUpload {
  private:
   LocalService* service_;
   BlobWriter writer_;
+  std::string tenant_;
 };
 
 WorkOptions LocalService::work_options() const {
   const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
-  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads,
-          options_.first_retry,   options_.require_sandbox};
+  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads, options_.first_retry,
+          options_.lease,         options_.require_sandbox};
 }
 
 void LocalService::drain() {
   bus_.close();
+  neighbours_.stop();
   plans_stop_.ask(StopReason::drain);
   supervisor_.stop();
   housekeeping_.stop();
@@ -162,9 +167,11 @@ Result<Created> LocalService::submit(const Submission& submission) {
   if (bus_.closed()) return draining();
   KILN_TRY(inputs, inputs_of(submission));
   NewJob job;
+  job.tenant = submission.tenant;
+  job.max_open = submission.max_open;
   job.label = submission.recipe.label;
   job.recipe = recipe_json(submission.recipe);
-  job.content_key = content_key(inputs, submission.recipe);
+  job.content_key = content_key(submission.tenant, inputs, submission.recipe);
   job.inputs = std::move(inputs);
   job.force = submission.force;
   job.idempotency_key = submission.idempotency_key;
@@ -187,7 +194,8 @@ Result<std::string> LocalService::plan(const Submission& submission) {
   if (place_among.others >= kPlansAtOnce)
     return fault("plan_busy", "other plans are being made; try again in a moment");
   for (const NamedBlob& file : all_files(inputs)) {
-    if (!has_asset(file.sha256)) return fault("asset_not_found", "no asset has this SHA-256", file.sha256);
+    if (!has_asset(file.sha256, submission.tenant))
+      return fault("asset_not_found", "no asset has this SHA-256", file.sha256);
   }
   return run_plan(inputs, recipe_json(submission.recipe), plans_stop_, place());
 }
@@ -255,20 +263,21 @@ Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const st
 
 Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
   if (bus_.closed()) return draining();
-  const DiskSpace disk = disk_space(options_.data);
-  if (disk.free_fraction < options_.soft_free_fraction || disk.free_bytes < request.expected) {
+  const DiskSpace room = disk();
+  if (room.free_fraction < options_.soft_free_fraction || room.free_bytes < request.expected) {
     return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
   }
   KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
-  return std::make_unique<LocalUpload>(*this, std::move(writer));
+  return std::make_unique<LocalUpload>(*this, std::move(writer), request.tenant);
 }
 
-bool LocalService::has_asset(const std::string& sha256) {
+bool LocalService::has_asset(const std::string& sha256, const std::optional<std::string>& tenant) {
   // The row decides: a file without one may be on its way out. Asking keeps the blob for another grace.
-  const std::shared_lock gate(blob_gate_);
-  if (!store_->knows_blob(sha256).value_or(false)) return false;
+  const auto gate = store_->enter_blob_gate();
+  if (!gate) return false;
+  if (!store_->knows_blob(sha256, tenant).value_or(false)) return false;
   const auto reader = blobs_->open_blob(sha256);
-  return reader && store_->touch_blob(sha256, reader->size()).has_value();
+  return reader && store_->touch_blob(sha256, reader->size(), tenant.value_or("")).has_value();
 }
 
 ServiceStats LocalService::stats() {
@@ -281,38 +290,56 @@ ServiceStats LocalService::stats() {
   stats.cached = counters_.cached;
   stats.retried = counters_.retried;
   stats.reaped = counters_.reaped;
+  stats.lost_leases = counters_.lost_leases;
   stats.stale_commits = counters_.stale_commits;
   stats.deaths_signal = counters_.deaths_signal;
   stats.deaths_memory = counters_.deaths_memory;
   stats.deaths_timeout = counters_.deaths_timeout;
   stats.bytes_uploaded = counters_.bytes_uploaded;
   stats.claim_latency_s_sum = static_cast<double>(counters_.claim_latency_ms) / 1000;
-  const DiskSpace disk = disk_space(options_.data);
-  stats.free_fraction = disk.free_fraction;
-  stats.free_bytes = disk.free_bytes;
+  const DiskSpace room = disk();
+  stats.free_fraction = room.free_fraction;
+  stats.free_bytes = room.free_bytes;
   return stats;
 }
 
-std::vector<std::string> LocalService::unready_reasons() {
-  std::vector<std::string> reasons;
-  if (bus_.closed()) reasons.emplace_back("the server stops");
-  if (const auto writable = store_->check_writable(); !writable) reasons.push_back(writable.error().message);
-  if (const auto probe = blobs_->write(); !probe) reasons.push_back(probe.error().message);
-  const double free = disk_space(options_.data).free_fraction;
+/// The fuller of the two disks: that of the workers, and that of the blobs where it is another.
+DiskSpace LocalService::disk() const {
+  const DiskSpace work = disk_space(options_.data), blobs = disk_space(blobs_->folder());
+  return work.free_fraction < blobs.free_fraction ? work : blobs;
+}
+
+std::vector<Check> LocalService::checks() {
+  const auto check = [](const char* name, const Result<void>& works) {
+    return Check{name, works.has_value(), works ? "ok" : works.error().message};
+  };
+  std::vector<Check> all{check("store", store_->check_writable()), check("blobs", blobs_->check())};
+  const double free = disk().free_fraction;
   if (free < options_.hard_free_fraction) {
-    reasons.emplace_back("the disk is nearly full: jobs wait");
+    all.push_back({"disk", false, "the disk is nearly full: jobs wait"});
   } else if (free < options_.soft_free_fraction) {
-    reasons.emplace_back("the disk is nearly full: uploads are refused");
+    all.push_back({"disk", false, "the disk is nearly full: uploads are refused"});
+  } else {
+    all.push_back({"disk", true, "ok"});
   }
-  return reasons;
+  const Sandbox sandbox = sandbox_support();
+  const char* locks = sandbox.whole() ? "files and calls"
+                      : sandbox.files ? "files only"
+                      : sandbox.calls ? "calls only"
+                                      : "none";
+  all.push_back({"sandbox", sandbox.whole() || !options_.require_sandbox, locks});
+  if (bus_.closed()) all.push_back({"drain", false, "the server stops"});
+  return all;
 }
 
 Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   ServiceOptions options = given;
   options.data = std::filesystem::absolute(given.data);
+  if (auto sound = check_addresses(options.stores); !sound) return tl::make_unexpected(sound.error());
   KILN_TRY(lock, DataLock::take(options.data));
-  KILN_TRY(store, open_sqlite_store({options.data / "kiln.db", {}}));
-  KILN_TRY(blobs, BlobStore::open(options.data));
+  KILN_TRY(store, open_job_store(options.stores, options.data));
+  KILN_TRY(blobs, open_blob_store(options.stores, options.data));
+  if (auto ours = check_owner(options.stores, *store, *blobs); !ours) return tl::make_unexpected(ours.error());
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
   if (!error) std::filesystem::create_directories(options.data / "checkpoints", error);
@@ -320,8 +347,10 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   // What an earlier server left behind: its workers died with it.
   remove_work_folders(options.data / "work");
   blobs->remove_dead_writers();
-  KILN_TRY(requeued, store->reap(true));
-  static_cast<void>(requeued);
+  if (!store->shared()) {
+    KILN_TRY(requeued, store->reap(true));
+    static_cast<void>(requeued);
+  }
   remove_stale_checkpoints(options.data / "checkpoints", *store);
   return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
 }

@@ -4,7 +4,7 @@
 // Fault codes and the status a front gives them:
 //   400 bad_cursor            404 not_found                 409 upload_busy, offset_mismatch, not_terminal
 //   422 asset_not_found, idempotency_mismatch, hash_mismatch, poisoned, and every fault of an input (plan, jobs)
-//   429 queue_full, plan_busy      503 draining             507 disk_full          500 store_failed, io_failed,
+//   429 queue_full, quota, plan_busy      503 draining             507 disk_full          500 store_failed, io_failed,
 //   internal
 // Every function may be called from any thread. Those with a timeout block their caller for at most that long.
 
@@ -20,11 +20,13 @@
 #include "core/bake/recipe.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/work/stores.h"
 
 namespace kiln {
 
 struct ServiceOptions {
-  std::filesystem::path data;               // holds kiln.db, cas/, tmp/, work/ and lock
+  std::filesystem::path data;               // of this server alone: work/, checkpoints/, lock; kiln.db, cas/, tmp/
+  StoreOptions stores;                      // where jobs and blobs live when not in `data`
   int workers = 1;                          // jobs at a time, each in a process of its own; 0: bake nothing
   int threads = 0;                          // of one worker when its recipe does not say; 0: hardware threads / workers
   std::vector<std::string> worker_command;  // empty: this very program with "bake-worker"
@@ -32,12 +34,15 @@ struct ServiceOptions {
   double soft_free_fraction = 0.10;  // below: uploads are refused with disk_full
   double hard_free_fraction = 0.05;  // below: nothing is claimed, the queue waits
   Millis blob_grace{24 * 3600 * 1000};
+  Millis lease{60'000};          // a job whose server says nothing for so long is given to another
   Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
   bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
 };
 
 /// A job or plan to be. All files are blobs already (put_asset).
 struct Submission {
+  std::string tenant;                    // whose the job is to be
+  int max_open = 0;                      // unfinished jobs that the tenant may have; 0: no limit
   std::string scene_name = "scene.glb";  // for error places
   std::string scene_sha256;              // empty: recipe.scene_asset
   std::vector<NamedBlob> resources;      // by URI as the .gltf writes it, percent-decoded
@@ -65,6 +70,7 @@ struct AssetRequest {
   std::string sha256;          // what the bytes must hash to; empty: not known
   std::uint64_t offset = 0;    // resume here, see asset_offset(); needs sha256
   std::uint64_t expected = 0;  // bytes to come if known: refused at once when the disk cannot take them
+  std::string tenant;          // who brings it
 };
 
 /// Events of one job or of all: first those the store kept, then as they happen. Never skips a durable one.
@@ -80,7 +86,7 @@ class EventStream {
 struct ServiceStats {
   StoreCounts jobs;
   std::uint64_t claimed = 0, succeeded = 0, failed = 0, canceled = 0, cached = 0;  // since start
-  std::uint64_t retried = 0, reaped = 0, stale_commits = 0;
+  std::uint64_t retried = 0, reaped = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;
   double claim_latency_s_sum = 0;  // created to claimed, over `claimed`
@@ -88,9 +94,17 @@ struct ServiceStats {
   std::uint64_t free_bytes = 0;
 };
 
+/// One thing that serving needs.
+struct Check {
+  std::string name;  // store, blobs, disk, sandbox, drain
+  bool ready = true;
+  std::string state;  // a sentence when not ready, else a word or two
+};
+
 class Service {
  public:
   /// Takes the lock ("data_in_use" when another server has it), recovers what an earlier one left, starts nothing yet.
+  /// In a fleet the running jobs of others stay theirs: only the end of a lease gives them back.
   static Result<std::unique_ptr<Service>> open(const ServiceOptions&);
   virtual ~Service() = default;
 
@@ -120,14 +134,15 @@ class Service {
 
   virtual Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) = 0;
   virtual Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) = 0;
-  virtual bool has_asset(const std::string& sha256) = 0;
+  /// Whether the tenant has it; without one: whether anybody has.
+  virtual bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) = 0;
   /// Where an interrupted upload of `sha256` goes on.
   virtual std::uint64_t asset_offset(const std::string& sha256) = 0;
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;
 
   virtual ServiceStats stats() = 0;
-  /// Why the service cannot take work, each a sentence; empty when it is ready.
-  virtual std::vector<std::string> unready_reasons() = 0;
+  /// Whether the service can take work, thing by thing.
+  virtual std::vector<Check> checks() = 0;
 };
 
 }  // namespace kiln

@@ -41,9 +41,21 @@ void Supervisor::cancel(const std::string& job_id) {
   if (found != running_.end()) found->second->ask(StopReason::cancel);
 }
 
-int Supervisor::busy() const {
+void Supervisor::look_for_cancels() {
+  std::vector<std::string> ids;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [id, signal] : running_) ids.push_back(id);
+  }
+  for (const std::string& id : ids) {
+    const auto job = place_.store.get(id);
+    if (job && job->cancel_requested) cancel(id);
+  }
+}
+
+bool Supervisor::runs(const std::string& job_id) const {
   const std::lock_guard lock(mutex_);
-  return static_cast<int>(running_.size());
+  return running_.contains(job_id);
 }
 
 void Supervisor::work() {
@@ -54,7 +66,8 @@ void Supervisor::work() {
       if (stopping_) return;
       seen = wakes_;
     }
-    const auto claim = may_claim_() ? place_.store.claim(kLease) : Result<std::optional<Claim>>(std::nullopt);
+    const auto claim =
+        may_claim_() ? place_.store.claim(place_.options.lease) : Result<std::optional<Claim>>(std::nullopt);
     if (claim && *claim) {
       run(**claim);
     } else {

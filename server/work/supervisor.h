@@ -29,7 +29,9 @@ class Supervisor {
   void wake();
   /// Ends the worker of this job, if it has one here.
   void cancel(const std::string& job_id);
-  int busy() const;
+  /// Ends workers here whose cancel another server wrote down.
+  void look_for_cancels();
+  bool runs(const std::string& job_id) const;
 
  private:
   void work();

@@ -15,15 +15,12 @@ tl::unexpected<Fault> folder_fault(const std::error_code& error) {
   return fault("io_failed", "the server could not make a folder for a worker");
 }
 
-Result<void> link_input(const BlobStore& blobs, const NamedBlob& file, const fs::path& target) {
-  std::error_code error;
-  fs::create_hard_link(blobs.path_of(file.sha256), target, error);
-  if (error == std::errc::no_such_file_or_directory) {
+Result<void> place_input(const BlobStore& blobs, const NamedBlob& file, const fs::path& target) {
+  auto placed = blobs.place(file.sha256, target);
+  if (!placed && placed.error().code == "not_found") {
     return fault("asset_lost", "the store lost the bytes of this asset: upload it again", file.sha256);
   }
-  if (error) fs::copy_file(blobs.path_of(file.sha256), target, error);  // a file system without hard links
-  if (error) return folder_fault(error);
-  return {};
+  return placed;
 }
 
 }  // namespace
@@ -38,8 +35,8 @@ Result<WorkFolder> WorkFolder::make(const fs::path& path, const BlobStore& blobs
   files.insert(files.end(), order.inputs.resources.begin(), order.inputs.resources.end());
   if (order.inputs.environment) files.push_back(*order.inputs.environment);
   for (std::size_t place = 0; place < files.size(); ++place) {
-    auto linked = link_input(blobs, files[place], path / input_path(place));
-    if (!linked) return tl::make_unexpected(linked.error());
+    auto placed = place_input(blobs, files[place], path / input_path(place));
+    if (!placed) return tl::make_unexpected(placed.error());
   }
   std::ofstream out(path / "job.json", std::ios::binary);
   out << order_json(order);

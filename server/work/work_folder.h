@@ -11,7 +11,8 @@ namespace kiln {
 /// Made and filled on construction through make(), removed with everything in it at the end.
 class WorkFolder {
  public:
-  /// Inputs are hard links to blobs. Fails with disk_full, io_failed, or asset_lost when a blob's file is gone.
+  /// Inputs are links to blobs or copies of them. Fails with disk_full, io_failed, blobs_unavailable, or asset_lost
+  /// when a blob is gone.
   static Result<WorkFolder> make(const std::filesystem::path& folder, const BlobStore&, const WorkerOrder&);
   WorkFolder(WorkFolder&&) noexcept;
   WorkFolder& operator=(WorkFolder&&) = delete;

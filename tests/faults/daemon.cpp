@@ -23,6 +23,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr const char* kListening = "kilnd listening on http://127.0.0.1:";
+constexpr const char* kWorking = "kilnd works for its fleet";
 
 pid_t spawn(const std::string& program, std::vector<std::string> arguments, const std::string& log) {
   posix_spawn_file_actions_t files;
@@ -82,6 +83,7 @@ Daemon::Daemon(const std::string& program, const std::filesystem::path& data,
   pid_ = spawn(program, all, log);
   for (int i = 0; i < 3000; ++i) {
     const std::string text = text_of(log);
+    if (text.find(kWorking) != std::string::npos) return;
     if (const auto found = text.find(kListening);
         found != std::string::npos && text.find('\n', found) != std::string::npos) {
       port_ = std::atoi(text.c_str() + found + std::strlen(kListening));

@@ -14,14 +14,14 @@ namespace kiln::testing {
 /// Kills and reaps in the destructor.
 class Daemon {
  public:
-  /// Starts `kilnd --data DATA --port 0 ...` and waits for its "listening" line. Throws std::runtime_error when it ends
-  /// instead. The program's own log goes to DATA.log.
+  /// Starts `kilnd --data DATA --port 0 ...` and waits for its "listening" line (or, of a `worker`, its first). Throws
+  /// std::runtime_error when it ends instead. The program's own log goes to DATA.log.
   Daemon(const std::string& program, const std::filesystem::path& data, const std::vector<std::string>& arguments);
   ~Daemon();
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  int port() const { return port_; }
+  int port() const { return port_; }  // 0 of a `worker`
   pid_t pid() const { return pid_; }
   void kill_hard();                              // SIGKILL, reaped
   int terminate();                               // SIGTERM; the wait status

@@ -7,12 +7,20 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/base/sha256.h"
 #include "tests/faults/daemon.h"
 
 namespace kiln::testing {
 namespace {
+
+using nlohmann::json;
+
+std::string sha256_of(const std::string& text) {
+  return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
 
 class KilndTest : public ::testing::Test {
  protected:
@@ -30,9 +38,9 @@ class KilndTest : public ::testing::Test {
     std::string text;
   };
   /// Runs a kilnd that should end by itself.
-  End refuse(const std::string& arguments) const {
+  End refuse(const std::string& arguments, const std::string& data = "data") const {
     const std::string out = folder_ / "out.txt";
-    const std::string command = std::string("timeout 20 ") + KILN_DAEMON + " --data " + (folder_ / "data").string() +
+    const std::string command = std::string("timeout 20 ") + KILN_DAEMON + " --data " + (folder_ / data).string() +
                                 " --port 0 " + arguments + " >" + out + " 2>&1";
     const int status = std::system(command.c_str());
     std::ifstream in(out);
@@ -71,7 +79,88 @@ TEST_F(KilndTest, ASecondServerOnTheSameDataIsRefused) {
   EXPECT_NE(end.text.find("another server"), std::string::npos) << end.text;
 }
 
-TEST_F(KilndTest, AnUnknownFlagIsAUsageError) { EXPECT_EQ(refuse("--no-such-flag").code, 2); }
+TEST_F(KilndTest, AddressesOfAFleetThatMeanNothingAreRefusedInOneLine) {
+  for (const char* arguments :
+       {"--store mysql://db/kiln --blobs dir:/tmp", "--store postgresql://kiln@db/kiln", "--blobs dir:relative",
+        "--blobs s3://bucket", "--blobs ftp://host", "worker",
+        "--blobs s3://bucket --s3-endpoint http://user:secret@host", "--s3-endpoint http://host --blobs s3://a/b"}) {
+    const End end = refuse(arguments);
+    EXPECT_EQ(end.code, 78) << arguments << end.text;
+    EXPECT_EQ(std::ranges::count(end.text, '\n'), 1) << end.text;
+  }
+}
+
+TEST_F(KilndTest, APasswordOnTheCommandLineIsRefusedAndNotRepeated) {
+  const End end = refuse("--blobs dir:/tmp --store postgresql://kiln:hunter2@127.0.0.1:1/kiln");
+  EXPECT_EQ(end.code, 78);
+  EXPECT_EQ(end.text.find("hunter2"), std::string::npos) << end.text;
+  ::setenv("KILN_STORE", "postgresql://kiln:hunter2@127.0.0.1:1/kiln", 1);
+  const End from_environment = refuse("--blobs dir:/tmp");
+  ::unsetenv("KILN_STORE");
+  EXPECT_EQ(from_environment.code, 1) << "the address is taken, and nobody answers there: " << from_environment.text;
+  EXPECT_EQ(from_environment.text.find("hunter2"), std::string::npos);
+}
+
+TEST_F(KilndTest, ABackupOfARunningServerServesTheSameJobsAndBytes) {
+  std::string id, artifact;
+  {
+    const auto daemon = start({"--soft-free-percent", "0", "--hard-free-percent", "0"});
+    const std::string scene = sha256_of(cube_glb());
+    EXPECT_EQ(http_put(daemon->port(), "/v1/assets/" + scene, cube_glb()).status, 201);
+    id = json::parse(http_post(daemon->port(), "/v1/jobs", cube_job(scene, 1)).body).at("id");
+    const json done = json::parse(http_get(daemon->port(), "/v1/jobs/" + id + "?wait=60").body);
+    ASSERT_EQ(done["status"], "succeeded") << done.dump();
+    artifact = done["artifacts"][0]["sha256"];
+    const End backup = refuse("admin backup " + (folder_ / "copy").string());
+    EXPECT_EQ(backup.code, 0) << backup.text;
+    EXPECT_GE(json::parse(backup.text)["blobs"], 3);
+    EXPECT_EQ(refuse("admin backup " + (folder_ / "copy").string()).code, 1) << "a backup never writes over another";
+    EXPECT_EQ(refuse("admin stats").code, 78) << "the server has the folder";
+  }
+  const Daemon copy(KILN_DAEMON, folder_ / "copy", {});
+  const json job = json::parse(http_get(copy.port(), "/v1/jobs/" + id).body);
+  EXPECT_EQ(job["status"], "succeeded");
+  for (const json& file : job["artifacts"]) {
+    EXPECT_EQ(sha256_of(http_get(copy.port(), file["url"]).body), file["sha256"]);
+  }
+  const End stats = refuse("admin stats");
+  EXPECT_EQ(json::parse(stats.text)["jobs"]["succeeded"], 1) << stats.text;
+}
+
+TEST_F(KilndTest, BlobsOfAnotherStoreAreRefusedBeforeTheyAreLost) {
+  const std::string shared = "dir:" + (folder_ / "shared").string();
+  { const auto first = start({"--blobs", shared}); }
+  { const auto again = start({"--blobs", shared}); }
+  const End end = refuse("--blobs " + shared, "other");
+  EXPECT_EQ(end.code, 78) << end.text;
+  EXPECT_NE(end.text.find("belongs to another"), std::string::npos) << end.text;
+}
+
+TEST_F(KilndTest, ScrubFindsAFlippedBitAndGcTakesWhatNobodyNeeds) {
+  const std::string scene = sha256_of(cube_glb());
+  EXPECT_EQ(http_put(start({})->port(), "/v1/assets/" + scene, cube_glb()).status, 201);
+  const End sound = refuse("admin scrub");
+  EXPECT_EQ(sound.code, 0) << sound.text;
+  EXPECT_EQ(json::parse(sound.text)["blobs"], 1);
+  {
+    std::fstream blob(folder_ / "data" / "cas" / scene.substr(0, 2) / scene, std::ios::in | std::ios::out);
+    blob.seekp(100);
+    blob.put('\x7f');
+  }
+  const End flipped = refuse("admin scrub");
+  EXPECT_EQ(flipped.code, 1);
+  EXPECT_EQ(json::parse(flipped.text)["wrong"], json::array({scene}));
+  EXPECT_EQ(json::parse(refuse("admin gc").text)["removed"], 0) << "its grace is not over";
+  EXPECT_EQ(json::parse(refuse("admin gc --blob-grace-s 0").text)["removed"], 1);
+  EXPECT_EQ(json::parse(refuse("admin stats").text)["blobs"], 0);
+}
+
+TEST_F(KilndTest, AnUnknownFlagIsAUsageError) {
+  EXPECT_EQ(refuse("--no-such-flag").code, 2);
+  EXPECT_EQ(refuse("admin dance").code, 2);
+  EXPECT_EQ(refuse("admin backup").code, 2);
+  EXPECT_EQ(refuse("admin stats somewhere").code, 2);
+}
 
 TEST_F(KilndTest, TermEndsAnIdleServerWithZero) {
   const auto daemon = start({});

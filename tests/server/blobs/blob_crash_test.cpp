@@ -40,7 +40,7 @@ class BlobCrash : public BlobTest, public ::testing::WithParamInterface<Way> {
   /// After any end: what is there is sound, nothing half is left, and trying again works.
   void expect_recovers(bool acknowledged) {
     FaultyFiles healthy;
-    const auto store = BlobStore::open(folder_, healthy).value();
+    const auto store = open_file_blobs(folder_, healthy).value();
     store->remove_dead_writers();
     expect_sound(*store);
     EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
@@ -57,7 +57,7 @@ TEST_P(BlobCrash, AKillAfterAnyCallLosesNothingAcknowledged) {
       FaultyFiles files;
       bool acknowledged = false;
       try {
-        const auto store = BlobStore::open(folder_, files).value();
+        const auto store = open_file_blobs(folder_, files).value();
         files.kill_at = files.calls + call;
         acknowledged = put(*store).has_value();
         killed = false;
@@ -77,7 +77,7 @@ TEST_P(BlobCrash, AKillWhileTheStoreIsMadeIsMendedByTheNextStart) {
     FaultyFiles files;
     files.kill_at = call;
     try {
-      static_cast<void>(BlobStore::open(folder_, files));
+      static_cast<void>(open_file_blobs(folder_, files));
     } catch (const Killed&) {
     }
     files.cut_power();
@@ -93,7 +93,7 @@ TEST_P(BlobCrash, AFailureOfAnyCallIsToldAndLeavesNothingHalf) {
       clear();
       FaultyFiles files;
       files.error = error;
-      const auto store = BlobStore::open(folder_, files).value();
+      const auto store = open_file_blobs(folder_, files).value();
       files.fail_at = files.calls + call;
       const auto stored = put(*store);
       failed = !files.failed_call.empty();
@@ -112,7 +112,7 @@ TEST_P(BlobCrash, AFailureOfAnyCallIsToldAndLeavesNothingHalf) {
 
 TEST_P(BlobCrash, InterruptedAndShortCallsAreCarriedOn) {
   FaultyFiles files;
-  const auto store = BlobStore::open(folder_, files).value();
+  const auto store = open_file_blobs(folder_, files).value();
   files.interrupt = files.short_writes = true;
   const auto stored = put(*store);
   ASSERT_TRUE(stored);

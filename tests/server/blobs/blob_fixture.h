@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "server/blobs/blob_store.h"
+#include "server/blobs/file_blobs.h"
 
 namespace kiln::testing {
 
@@ -36,9 +36,8 @@ class BlobTest : public ::testing::Test {
   }
   /// Every blob's bytes hash to its name.
   static void expect_sound(const BlobStore& store) {
-    store.for_each([&](const std::string& sha256, std::uint64_t) {
-      EXPECT_EQ(sha256_hex(bytes_of(read(store, sha256))), sha256);
-    });
+    EXPECT_TRUE(store.for_each(
+        [&](const BlobEntry& blob) { EXPECT_EQ(sha256_hex(bytes_of(read(store, blob.sha256))), blob.sha256); }));
   }
 
   std::filesystem::path folder_;

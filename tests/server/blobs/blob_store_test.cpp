@@ -1,127 +1,142 @@
-#include "server/blobs/blob_store.h"
+// The conformance suite on files and on the fake S3 store, and what only one of them promises.
 
 #include <fstream>
 
-#include "tests/server/blobs/blob_fixture.h"
+#include "server/blobs/s3_blobs.h"
+#include "tests/fixtures/fake_s3.h"
+#include "tests/server/blobs/blob_conformance.h"
 
 namespace kiln::testing {
 namespace {
 
-StoredBlob put(BlobStore& store, const std::string& text) {
-  auto writer = store.write().value();
-  EXPECT_TRUE(writer.write(bytes_of(text)));
-  return writer.finish().value();
+FakeS3& fake_s3() {
+  static FakeS3 one;
+  return one;
 }
 
-TEST_F(BlobTest, ABlobIsNamedByItsHashAndReadsBackInPieces) {
-  const auto store = BlobStore::open(folder_).value();
-  const StoredBlob blob = put(*store, "hello blob");
-  EXPECT_EQ(blob.sha256, sha256_hex(bytes_of("hello blob")));
-  EXPECT_EQ(blob.bytes, 10U);
-  EXPECT_FALSE(blob.existed);
-  EXPECT_TRUE(put(*store, "hello blob").existed);
-  EXPECT_EQ(read(*store, blob.sha256), "hello blob");
-  std::string piece(4, ' ');
-  const auto reader = store->open_blob(blob.sha256).value();
-  EXPECT_EQ(reader.read(8, {reinterpret_cast<std::uint8_t*>(piece.data()), 4}).value(), 2U);
-  EXPECT_EQ(piece.substr(0, 2), "ob");
+S3Options fake_options() {
+  S3Options options{fake_s3().endpoint(), FakeS3::kBucket, "us-east-1", "key", "secret"};
+  options.first_pause = std::chrono::milliseconds(1);
+  options.stall_timeout = std::chrono::seconds(1);
+  return options;
 }
 
-TEST_F(BlobTest, AWriterThatIsDroppedLeavesNothing) {
-  const auto store = BlobStore::open(folder_).value();
-  {
-    auto writer = store->write().value();
-    EXPECT_TRUE(writer.write(bytes_of("half")));
-    EXPECT_EQ(files_in(folder_ / "tmp"), 1U);
-  }
-  EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
+BlobPlace files() {
+  return {"files", [](const std::filesystem::path& folder) { return open_file_blobs(folder).value(); }};
+}
+BlobPlace fake() {
+  return {"fake_s3", [](const std::filesystem::path& folder) { return open_s3_blobs(fake_options(), folder).value(); },
+          [] { fake_s3().clear(); }};
 }
 
-TEST_F(BlobTest, ANamedUploadGoesOnWhereItStopped) {
-  const auto store = BlobStore::open(folder_).value();
-  const std::string text = "first half, second half";
-  const std::string sha256 = sha256_hex(bytes_of(text));
-  {
-    auto writer = store->write_named(sha256).value();
-    EXPECT_TRUE(writer.write(bytes_of(text.substr(0, 11))));
-  }
-  EXPECT_EQ(store->partial_bytes(sha256), 11U);
-  EXPECT_EQ(store->write_named(sha256, 5).error().code, "offset_mismatch");
-  auto writer = store->write_named(sha256, 11).value();
-  EXPECT_EQ(writer.bytes(), 11U);
-  EXPECT_TRUE(writer.write(bytes_of(text.substr(11))));
-  EXPECT_EQ(writer.finish()->bytes, text.size());
-  EXPECT_EQ(read(*store, sha256), text);
-  EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
-}
+}  // namespace
 
-TEST_F(BlobTest, BytesThatDoNotHashToTheirNameAreRefusedAndGone) {
-  const auto store = BlobStore::open(folder_).value();
-  const std::string sha256(64, 'a');
-  auto writer = store->write_named(sha256).value();
-  EXPECT_TRUE(writer.write(bytes_of("other bytes")));
-  EXPECT_EQ(writer.finish().error().code, "hash_mismatch");
-  EXPECT_FALSE(store->exists(sha256));
-  EXPECT_EQ(store->partial_bytes(sha256), 0U);
-}
+INSTANTIATE_TEST_SUITE_P(Places, BlobConformance, ::testing::Values(files(), fake()), place_name);
 
-TEST_F(BlobTest, OneUploadOfANameAtATime) {
-  const auto store = BlobStore::open(folder_).value();
-  const std::string sha256(64, 'a');
-  {
-    const auto first = store->write_named(sha256).value();
-    EXPECT_EQ(store->write_named(sha256).error().code, "upload_busy");
-  }
-  EXPECT_TRUE(store->write_named(sha256));
-}
+namespace {
 
-TEST_F(BlobTest, NamesThatAreNoHashFindNothing) {
-  const auto store = BlobStore::open(folder_).value();
-  for (const std::string& name : {std::string("../../etc/passwd"), std::string(64, 'A'), std::string(63, 'a')}) {
-    EXPECT_EQ(store->open_blob(name).error().code, "not_found");
-    EXPECT_FALSE(store->exists(name));
-    EXPECT_EQ(store->write_named(name).error().code, "hash_mismatch");
-    EXPECT_EQ(store->partial_bytes(name), 0U);
-  }
-}
-
-Result<StoredBlob> adopt(BlobStore& store, const std::filesystem::path& file) {
-  auto stored = store.adopt({&file, 1});
-  if (!stored) return tl::make_unexpected(stored.error());
-  return stored->front();
-}
-
-TEST_F(BlobTest, AnAdoptedFileMovesInAndLinksAreNotFollowed) {
-  const auto store = BlobStore::open(folder_).value();
-  std::ofstream(folder_ / "result") << "result bytes";
-  const StoredBlob blob = adopt(*store, folder_ / "result").value();
-  EXPECT_EQ(read(*store, blob.sha256), "result bytes");
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "result"));
-  std::filesystem::create_symlink("/etc/passwd", folder_ / "link");
-  EXPECT_EQ(adopt(*store, folder_ / "link").error().code, "not_found");
-  EXPECT_EQ(adopt(*store, folder_ / "tmp").error().code, "not_found");
-  EXPECT_EQ(adopt(*store, folder_ / "missing").error().code, "not_found");
-}
-
-TEST_F(BlobTest, AnOpenBlobOutlivesItsRemoval) {
-  const auto store = BlobStore::open(folder_).value();
-  const StoredBlob blob = put(*store, "kept open");
+TEST_F(BlobTest, AnOpenFileOutlivesItsRemoval) {
+  const auto store = open_file_blobs(folder_).value();
+  auto writer = store->write().value();
+  EXPECT_TRUE(writer.write(bytes_of("kept open")));
+  const StoredBlob blob = writer.finish().value();
   const auto reader = store->open_blob(blob.sha256).value();
   EXPECT_TRUE(store->remove(blob.sha256));
-  EXPECT_FALSE(store->exists(blob.sha256));
   std::string text(9, ' ');
   EXPECT_EQ(reader.read(0, {reinterpret_cast<std::uint8_t*>(text.data()), 9}).value(), 9U);
   EXPECT_EQ(text, "kept open");
-  EXPECT_TRUE(store->remove(blob.sha256)) << "removing twice is fine";
 }
 
-TEST_F(BlobTest, PartsThatNobodyGoesOnWithExpireAndLivingOnesStay) {
-  const auto store = BlobStore::open(folder_).value();
-  store->write_named(std::string(64, 'a')).value();
-  const auto living = store->write_named(std::string(64, 'b')).value();
-  EXPECT_EQ(store->expire_partials(3600), 0);
-  EXPECT_EQ(store->expire_partials(0), 1);
-  EXPECT_EQ(files_in(folder_ / "tmp"), 1U);
+TEST_F(BlobTest, ResultsOfAnotherFileSystemAreCopiedIn) {
+  const auto store = open_file_blobs(folder_).value();
+  std::string name = (std::filesystem::temp_directory_path() / "kiln_result.XXXXXX").string();
+  const int fd = ::mkstemp(name.data());
+  ASSERT_EQ(::write(fd, "far away", 8), 8);
+  ::close(fd);
+  const auto blobs = store->adopt(std::vector<std::filesystem::path>{name}).value();
+  EXPECT_EQ(read(*store, blobs[0].sha256), "far away");
+  EXPECT_FALSE(std::filesystem::exists(name));
+  EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
+}
+
+class S3Faults : public BlobTest {
+ protected:
+  using Trouble = FakeS3::Trouble;
+  S3Faults() {
+    fake_s3().clear();
+    store_ = open_s3_blobs(fake_options(), folder_ / "spool").value();
+  }
+  ~S3Faults() override { fake_s3().clear(); }
+  Result<StoredBlob> put(const std::string& text) {
+    auto writer = store_->write().value();
+    EXPECT_TRUE(writer.write(bytes_of(text)));
+    return writer.finish();
+  }
+  Result<void> place(const std::string& sha256) { return store_->place(sha256, folder_ / "input"); }
+  std::unique_ptr<BlobStore> store_;
+};
+
+TEST_F(S3Faults, APassingTroubleIsOverComeByAnotherTry) {
+  const std::string text = "patience";
+  for (const Trouble kind : {Trouble::status_500, Trouble::status_503, Trouble::stalled}) {
+    fake_s3().trouble(kind, 1);
+    EXPECT_TRUE(put(text + std::to_string(static_cast<int>(kind))));
+  }
+  const std::string sha256 = put(text)->sha256;
+  for (const Trouble kind : {Trouble::status_500, Trouble::status_503, Trouble::stalled, Trouble::cut}) {
+    fake_s3().trouble(kind, 1);
+    EXPECT_TRUE(place(sha256)) << static_cast<int>(kind);
+    std::ifstream in(folder_ / "input");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), text);
+    std::filesystem::remove(folder_ / "input");
+  }
+}
+
+TEST_F(S3Faults, ALastingTroubleIsToldAndLeavesNothing) {
+  const std::string sha256 = put("bytes")->sha256;
+  for (const Trouble kind : {Trouble::status_500, Trouble::status_503, Trouble::cut}) {
+    fake_s3().trouble(kind, 1000);
+    EXPECT_EQ(place(sha256).error().code, "blobs_unavailable");
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "input"));
+    EXPECT_EQ(store_->remove(sha256).has_value(), kind == Trouble::cut);
+    fake_s3().clear();
+    static_cast<void>(put("bytes"));
+  }
+  fake_s3().trouble(Trouble::status_500, 1000);
+  EXPECT_EQ(put("others").error().code, "blobs_unavailable");
+  EXPECT_EQ(store_->check().error().code, "blobs_unavailable");
+  EXPECT_EQ(files_in(folder_ / "spool" / "tmp"), 0U);
+}
+
+TEST_F(S3Faults, OtherBytesThanTheNameSaysAreNeverHandedOn) {
+  const std::string sha256 = put("right bytes")->sha256;
+  fake_s3().trouble(Trouble::wrong_bytes, 1);
+  EXPECT_EQ(place(sha256).error().code, "blobs_unavailable");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "input"));
+
+  const auto reader = store_->open_blob(sha256).value();
+  std::string text(11, ' ');
+  const std::span<std::uint8_t> out(reinterpret_cast<std::uint8_t*>(text.data()), text.size());
+  EXPECT_TRUE(reader.read(0, out.first(5)));
+  fake_s3().trouble(Trouble::wrong_bytes, 1);
+  EXPECT_FALSE(reader.read(5, out.subspan(5)));
+}
+
+TEST_F(S3Faults, ARefusalIsNotTriedAgainAndARedirectIsNotFollowed) {
+  for (const Trouble kind : {Trouble::refused, Trouble::elsewhere}) {
+    const int before = fake_s3().requests();
+    fake_s3().trouble(kind, 1000);
+    EXPECT_EQ(store_->check().error().code, "blobs_refused");
+    EXPECT_EQ(fake_s3().requests(), before + 1);
+  }
+}
+
+TEST_F(S3Faults, AStoreThatIsNotThereIsUnavailable) {
+  S3Options nowhere = fake_options();
+  nowhere.endpoint = "http://127.0.0.1:1";
+  EXPECT_EQ(open_s3_blobs(nowhere, folder_ / "spool").error().code, "blobs_unavailable");
+  nowhere.endpoint = "file:///etc";
+  EXPECT_FALSE(open_s3_blobs(nowhere, folder_ / "spool"));
 }
 
 }  // namespace

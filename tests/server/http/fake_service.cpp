@@ -4,11 +4,13 @@
 
 #include <stdexcept>
 
+#include "server/blobs/file_blobs.h"
+
 namespace kiln {
 namespace {
 
 std::unique_ptr<BlobStore> open_store(const std::filesystem::path& folder) {
-  auto store = BlobStore::open(folder);
+  auto store = open_file_blobs(folder);
   if (!store) throw std::runtime_error("the test's blob store does not open");
   return std::move(*store);
 }
@@ -115,8 +117,10 @@ void FakeService::say(const std::string& id, EventKind kind, const std::string& 
 
 void FakeService::throw_on_list(std::string what) { list_exception_ = std::move(what); }
 void FakeService::refuse_submit(Fault why) { submit_fault_ = std::move(why); }
-void FakeService::not_ready(std::string reason) { unready_.push_back(std::move(reason)); }
-std::vector<std::string> FakeService::unready_reasons() { return unready_; }
+void FakeService::not_ready(std::string reason) {
+  checks_.push_back({"check" + std::to_string(checks_.size()), false, std::move(reason)});
+}
+std::vector<Check> FakeService::checks() { return checks_; }
 
 Submission FakeService::last_submission() {
   const std::lock_guard lock(mutex_);

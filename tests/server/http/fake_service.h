@@ -39,11 +39,13 @@ class FakeService : public Service {
                                                  std::optional<std::uint64_t> after) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
-  bool has_asset(const std::string& sha256) override { return blobs().exists(sha256); }
+  bool has_asset(const std::string& sha256, const std::optional<std::string>&) override {
+    return blobs().exists(sha256);
+  }
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
   ServiceStats stats() override { return {}; }
-  std::vector<std::string> unready_reasons() override;
+  std::vector<Check> checks() override;
 
  private:
   friend class FakeStream;
@@ -59,7 +61,7 @@ class FakeService : public Service {
   std::map<std::string, Job> jobs_;
   std::map<std::string, std::string> keys_;  // idempotency key -> job
   std::vector<JobEvent> events_;
-  std::vector<std::string> unready_;
+  std::vector<Check> checks_;
   std::optional<Fault> submit_fault_;
   std::string list_exception_;
   Submission last_;

@@ -8,7 +8,7 @@
 
 #include "core/base/sha256.h"
 #include "server/api/problem.h"
-#include "server/http/auth.h"
+#include "server/http/visitors.h"
 #include "tests/server/http/raw_client.h"
 
 namespace kiln {
@@ -25,10 +25,16 @@ double peak_resident_mb() {
 
 void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
+AccessToken access(const std::string& token) {
+  AccessToken one;
+  one.hash = sha256_hex({reinterpret_cast<const std::uint8_t*>(token.data()), token.size()});
+  return one;
+}
+
 TEST(Security, S2OneOfTheTokensOpensAndNothingElseDoes) {
   const std::string token = "Abc_-" + std::string(38, 'z');
   HttpOptions options = few_threads();
-  options.token_hashes = {sha256_hex({reinterpret_cast<const std::uint8_t*>(token.data()), token.size()})};
+  options.tokens = {access(token)};
   RunningServer server(options);
   const auto status = [&](const std::string& value) {
     return server.get("/v1/jobs", {"Authorization: " + value}).status;
@@ -53,13 +59,78 @@ TEST(Security, S2ATokenFileIsReadStrictly) {
   const std::string file = place.folder() / "tokens";
   const auto read = [&](const std::string& text) {
     std::ofstream(file) << text;
-    return read_token_hashes(file);
+    return read_tokens(file);
   };
   const std::string token(43, 't');
   EXPECT_EQ(read("# ours\n\n" + token + "\r\n" + token + "\n")->size(), 2U);
   EXPECT_EQ(read(token + "\nshort\n").error().where, "line 2");
   EXPECT_EQ(read("# nothing\n").error().code, "bad_token_file");
-  EXPECT_EQ(read_token_hashes(file + ".none").error().code, "bad_token_file");
+  EXPECT_EQ(read_tokens(file + ".none").error().code, "bad_token_file");
+}
+
+TEST(Security, S2AWordBehindATokenThatMeansNothingIsRefused) {
+  FakeService place;
+  const std::string file = place.folder() / "tokens", token(43, 't');
+  const auto read = [&](const std::string& words) {
+    std::ofstream(file) << token << ' ' << words << '\n';
+    return read_tokens(file);
+  };
+  const auto good = read("tenant=studio-a scopes=read jobs=5 uploads=2 rate=0.5");
+  ASSERT_TRUE(good);
+  EXPECT_EQ(good->front().tenant, "studio-a");
+  EXPECT_TRUE(good->front().read);
+  EXPECT_FALSE(good->front().submit || good->front().admin);
+  EXPECT_EQ(good->front().max_jobs, 5);
+  EXPECT_EQ(good->front().rate, 0.5);
+  EXPECT_FALSE(read("tenant=a")->front().admin) << "a tenant does not see the others";
+  EXPECT_TRUE(read("")->front().admin);
+  for (const char* words : {"tenant=", "tenant=a/b", "scopes=", "scopes=write", "scopes=read,", "jobs=0", "jobs=-1",
+                            "jobs=x", "rate=1x", "colour=red", "tenant", "tenant=a scopes=admin", "jobs=3"}) {
+    EXPECT_FALSE(read(words)) << words;
+  }
+}
+
+TEST(Security, S2AScopeOpensWhatItNamesAndNothingElse) {
+  const std::string reader(43, 'r'), submitter(43, 's'), admin(43, 'a');
+  HttpOptions options = few_threads();
+  options.tokens = {access(reader), access(submitter), access(admin)};
+  options.tokens[0].submit = options.tokens[0].admin = false;
+  options.tokens[1].read = options.tokens[1].admin = false;
+  RunningServer server(options);
+  const auto status = [&](const char* method, const char* path, const std::string& token) {
+    return server.raw(request_text(method, path, {"Authorization: Bearer " + token, "Content-Length: 0"})).status;
+  };
+  EXPECT_EQ(status("GET", "/v1/jobs", reader), 200);
+  EXPECT_EQ(status("POST", "/v1/jobs", reader), 403);
+  EXPECT_EQ(status("DELETE", "/v1/jobs/x", reader), 403);
+  EXPECT_EQ(status("GET", "/metrics", reader), 403);
+  EXPECT_EQ(status("GET", "/v1/jobs", submitter), 403);
+  EXPECT_EQ(status("POST", "/v1/jobs/x/cancel", submitter), 404);
+  EXPECT_EQ(status("GET", "/metrics", admin), 200);
+}
+
+TEST(Security, S4ATokenThatIsUsedTooOftenWaitsAndAnotherDoesNot) {
+  const std::string busy(43, 'b'), calm(43, 'c');
+  HttpOptions options = few_threads();
+  options.tokens = {access(busy), access(calm)};
+  options.tokens[0].rate = 0.5;  // five at once
+  RunningServer server(options);
+  const auto ask = [&](const std::string& token) { return server.get("/v1/jobs", {"Authorization: Bearer " + token}); };
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(ask(busy).status, 200) << i;
+  RawReply refused = ask(busy);
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(refused.fields["retry-after"], "2");
+  EXPECT_EQ(ask(calm).status, 200);
+}
+
+TEST(Security, S4TheRateComesBackWithTime) {
+  RateLimit limit(2);
+  auto now = std::chrono::steady_clock::now();
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(limit.take(now));
+  EXPECT_FALSE(limit.take(now));
+  now += std::chrono::milliseconds(600);
+  EXPECT_TRUE(limit.take(now));
+  EXPECT_FALSE(limit.take(now));
 }
 
 TEST(Security, S3AGigabyteStreamsThroughInSmallMemory) {

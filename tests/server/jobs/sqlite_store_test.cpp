@@ -8,7 +8,15 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/server/jobs/store_conformance.h"
+
 namespace kiln {
+
+namespace testing {
+INSTANTIATE_TEST_SUITE_P(SQLite, StoreConformance, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
+INSTANTIATE_TEST_SUITE_P(SQLite, StoreClaims, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
+}  // namespace testing
+
 namespace {
 
 class SqliteStoreTest : public ::testing::Test {
@@ -50,6 +58,23 @@ TEST_F(SqliteStoreTest, ADatabaseOfANewerProgramIsRefused) {
   open_sqlite_store({file(), {}}).value();
   ASSERT_EQ(run("PRAGMA user_version=999"), SQLITE_OK);
   EXPECT_EQ(open_sqlite_store({file(), {}}).error().code, "schema_too_new");
+}
+
+TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
+  std::string id;
+  {
+    const auto store = open_sqlite_store({file(), {}}).value();
+    id = finished_job(*store).id;
+  }
+  // Back to how version 1 was.
+  ASSERT_EQ(run("DROP TABLE blob_tenant; DROP TABLE identity; DROP INDEX job_by_tenant; DROP INDEX job_running;"
+                "ALTER TABLE job DROP COLUMN tenant; CREATE INDEX job_running ON job(id) WHERE state='running';"
+                "PRAGMA user_version=1"),
+            SQLITE_OK);
+  const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_EQ(store->get(id)->state, JobState::canceled);
+  EXPECT_EQ(store->get(id)->tenant, "");
+  EXPECT_TRUE(store->knows_blob(std::string(64, 'a'), "").value());
 }
 
 TEST_F(SqliteStoreTest, AFileThatIsNoDatabaseIsRefused) {

@@ -1,8 +1,10 @@
 #pragma once
-// What every engine of JobStore must do. An engine joins by one more line in INSTANTIATE_TEST_SUITE_P.
+// What every engine of JobStore must do. An engine joins by two lines of INSTANTIATE_TEST_SUITE_P in a file of its own;
+// broken_stores_test.cpp shows that the suite finds engines that do not.
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -20,9 +22,13 @@ struct TestClock {
 struct Engine {
   std::string name;
   std::function<std::unique_ptr<JobStore>(const std::filesystem::path& folder, TestClock&)> open;
+  std::function<void()> empty = [] {};  // before a test: for an engine that keeps nothing in `folder`
 };
 
-const Engine& sqlite_engine();
+inline std::string engine_name(const ::testing::TestParamInfo<Engine>& info) { return info.param.name; }
+
+/// SQLite in `folder`, on the test's clock.
+std::unique_ptr<JobStore> open_sqlite_on(const std::filesystem::path& folder, TestClock&);
 
 inline constexpr Millis kTestLease{60'000};
 
@@ -45,7 +51,10 @@ class StoreConformance : public ::testing::TestWithParam<Engine> {
  private:
   std::filesystem::path folder_;
   std::unique_ptr<JobStore> store_;
-  int keys_ = 0;
+  std::atomic<int> keys_{0};
 };
+
+/// Claims, leases, fences: what keeps results exactly-once.
+class StoreClaims : public StoreConformance {};
 
 }  // namespace kiln::testing

@@ -1,13 +1,14 @@
 // Claims, leases, fences: the part of the suite that keeps results exactly-once.
 
 #include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <set>
 #include <thread>
 
 #include "tests/server/jobs/store_conformance.h"
 
 namespace kiln::testing {
-
-class StoreClaims : public StoreConformance {};
 
 namespace {
 
@@ -94,6 +95,68 @@ TEST_P(StoreClaims, AHeartbeatKeepsTheLeaseAndTheProgress) {
   EXPECT_EQ(job.progress->eta_s, 7.5);
 }
 
+TEST_P(StoreClaims, ACommitThatIsRepeatedBecauseItsAnswerGotLostIsDone) {
+  const std::string id = create().id;
+  const Claim mine = claim();
+  EXPECT_EQ(store().commit(mine.ref, std::vector{artifact()}, false), Wrote::done);
+  EXPECT_EQ(store().commit(mine.ref, std::vector{artifact()}, false), Wrote::done);
+  EXPECT_EQ(store().get(id)->artifacts.size(), 1U);
+  EXPECT_EQ(store().events_after(0, id, 100)->size(), 5U) << "and told once";
+}
+
+TEST_P(StoreClaims, OneOfManyCommitsUnderOneClaimMakesTheResult) {
+  const std::string id = create().id;
+  const Claim mine = claim();
+  std::vector<std::thread> threads;
+  std::atomic<int> done{0};
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&] { done += store().commit(mine.ref, std::vector{artifact()}, false) == Wrote::done; });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(done, 4);
+  EXPECT_EQ(store().get(id)->artifacts.size(), 1U);
+}
+
+TEST_P(StoreClaims, CancelAndCommitAtTheSameMomentLeaveOneOfTheTwo) {
+  for (int round = 0; round < 10; ++round) {
+    const std::string id = create().id;
+    const Claim mine = claim();
+    std::thread canceler([&] { EXPECT_TRUE(store().cancel(id)); });
+    const Wrote wrote = store().commit(mine.ref, std::vector{artifact()}, false).value();
+    canceler.join();
+    if (wrote == Wrote::lost) {
+      EXPECT_EQ(store().finish_cancel(mine.ref), Wrote::done);
+    }
+    const Job job = store().get(id).value();
+    EXPECT_EQ(job.state, wrote == Wrote::done ? JobState::succeeded : JobState::canceled);
+    EXPECT_EQ(job.artifacts.empty(), wrote == Wrote::lost);
+  }
+}
+
+TEST_P(StoreClaims, AReaderOfEventsMissesNoneOfManyWriters) {
+  constexpr int kEach = 20;
+  std::vector<std::thread> writers;
+  for (int i = 0; i < 4; ++i) {
+    writers.emplace_back([&] {
+      NewJob asked = job();
+      for (int n = 0; n < kEach; ++n) EXPECT_TRUE(store().create(asked));
+    });
+  }
+  std::set<std::uint64_t> seen;
+  std::uint64_t last = 0;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (seen.size() < 4 * kEach && std::chrono::steady_clock::now() < deadline) {
+    const auto page = store().events_after(last, "", 7).value();
+    for (const JobEvent& event : page) {
+      last = event.id;
+      seen.insert(event.id);
+    }
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_EQ(seen.size(), 4U * kEach);
+  EXPECT_TRUE(store().events_after(last, "", 7)->empty());
+}
+
 TEST_P(StoreClaims, CancelBeatsACommitThatComesAfterIt) {
   const std::string id = create().id;
   const Claim mine = claim();
@@ -172,8 +235,5 @@ TEST_P(StoreClaims, ARestartPutsEveryRunningJobBackAtOnce) {
 }
 
 }  // namespace
-
-INSTANTIATE_TEST_SUITE_P(Engines, StoreClaims, ::testing::Values(sqlite_engine()),
-                         [](const auto& param) { return param.param.name; });
 
 }  // namespace kiln::testing

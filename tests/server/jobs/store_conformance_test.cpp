@@ -1,23 +1,22 @@
 #include "tests/server/jobs/store_conformance.h"
 
 #include <algorithm>
+#include <atomic>
 #include <set>
+#include <thread>
 
 #include "server/jobs/sqlite_store.h"
 
 namespace kiln::testing {
 
-const Engine& sqlite_engine() {
-  static const Engine engine{
-      "sqlite", [](const std::filesystem::path& folder, TestClock& clock) {
-        return open_sqlite_store({folder / "kiln.db", [&clock] { return clock.now_ms; }}).value();
-      }};
-  return engine;
+std::unique_ptr<JobStore> open_sqlite_on(const std::filesystem::path& folder, TestClock& clock) {
+  return open_sqlite_store({folder / "kiln.db", [&clock] { return clock.now_ms; }}).value();
 }
 
 StoreConformance::StoreConformance() {
   std::string name = (std::filesystem::temp_directory_path() / "kiln_store.XXXXXX").string();
   folder_ = ::mkdtemp(name.data());
+  GetParam().empty();
   store_ = GetParam().open(folder_, clock_);
   EXPECT_TRUE(store_->touch_blob(sha('a'), 100));
 }
@@ -256,9 +255,106 @@ TEST_P(StoreConformance, CountsFollowTheStates) {
   EXPECT_EQ(counts.oldest_queued_ms, clock_.now_ms);
 }
 
-}  // namespace
+TEST_P(StoreConformance, ATenantsAssetsKeysAndListAreItsOwn) {
+  NewJob ours = job("ours", "key a"), theirs = job("theirs", "key b");
+  ours.tenant = "a";
+  theirs.tenant = "b";
+  ours.idempotency_key = theirs.idempotency_key = "once";
+  EXPECT_EQ(store().create(ours).error().code, "asset_not_found") << "the scene is nobody's of a";
+  EXPECT_TRUE(store().touch_blob(sha('a'), 100, "a"));
+  EXPECT_TRUE(store().knows_blob(sha('a'), "a").value());
+  EXPECT_FALSE(store().knows_blob(sha('a'), "b").value());
+  EXPECT_TRUE(store().knows_blob(sha('a')).value());
+  EXPECT_TRUE(store().touch_blob(sha('a'), 100, "b"));
+  const std::string id = store().create(ours).value().job.id;
+  EXPECT_FALSE(store().create(theirs).value().existed) << "the same key of another tenant is another key";
+  EXPECT_TRUE(store().create(ours).value().existed);
+  EXPECT_EQ(store().get(id)->tenant, "a");
+  JobQuery query;
+  query.tenant = "a";
+  ASSERT_EQ(store().list(query)->jobs.size(), 1U);
+  EXPECT_EQ(store().list(query)->jobs[0].id, id);
+  store().commit(claim().ref, std::vector{artifact()}, false).value();
+  EXPECT_TRUE(store().knows_blob(sha('e'), "a").value()) << "what a tenant baked is its own";
+  EXPECT_FALSE(store().knows_blob(sha('e'), "b").value());
+}
 
-INSTANTIATE_TEST_SUITE_P(Engines, StoreConformance, ::testing::Values(sqlite_engine()),
-                         [](const auto& param) { return param.param.name; });
+TEST_P(StoreConformance, ATenantHasSoManyUnfinishedJobsAndAnotherIsNotHeldUp) {
+  for (const char* tenant : {"a", "b"}) EXPECT_TRUE(store().touch_blob(sha('a'), 100, tenant));
+  const auto submit = [&](const std::string& tenant) {
+    NewJob asked = job();
+    asked.tenant = tenant;
+    asked.max_open = 2;
+    return store().create(asked);
+  };
+  EXPECT_TRUE(submit("a"));
+  claim();  // a running job counts as well
+  EXPECT_TRUE(submit("a"));
+  EXPECT_EQ(submit("a").error().code, "quota");
+  EXPECT_TRUE(submit("b"));
+}
+
+TEST_P(StoreConformance, TheTenantWithTheFewestRunningJobsIsNext) {
+  for (const char* tenant : {"a", "b"}) EXPECT_TRUE(store().touch_blob(sha('a'), 100, tenant));
+  const auto submit = [&](const std::string& tenant) {
+    NewJob asked = job();
+    asked.tenant = tenant;
+    EXPECT_TRUE(store().create(asked));
+  };
+  for (int i = 0; i < 3; ++i) submit("a");
+  for (int i = 0; i < 2; ++i) submit("b");
+  std::string order;
+  for (int i = 0; i < 5; ++i) order += claim().job.tenant;
+  EXPECT_EQ(order, "ababa");
+}
+
+TEST_P(StoreConformance, AStoreIsTheSameForEver) {
+  const std::string identity = store().identity().value();
+  EXPECT_EQ(identity.size(), 32U);
+  EXPECT_EQ(identity.find_first_not_of("0123456789abcdef"), std::string::npos) << identity;
+  reopen();
+  EXPECT_EQ(store().identity().value(), identity);
+}
+
+TEST_P(StoreConformance, TheBlobGateLetsManyInAndThenOneAlone) {
+  auto first = store().enter_blob_gate();
+  auto second = store().enter_blob_gate();
+  EXPECT_TRUE(first && second);
+  first->reset();
+  second->reset();
+  EXPECT_TRUE(store().close_blob_gate());
+  EXPECT_TRUE(store().enter_blob_gate()) << "a gate opens again at the end of its holder";
+}
+
+TEST_P(StoreConformance, NobodyMakesABlobWhileOneIsAloneAtTheGate) {
+  auto alone = store().close_blob_gate();
+  ASSERT_TRUE(alone);
+  std::atomic<bool> inside{false};
+  std::thread other([&] {
+    const auto gate = store().enter_blob_gate();
+    inside = gate.has_value();
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // a gate that does not hold lets it in by now
+  EXPECT_FALSE(inside);
+  alone->reset();
+  other.join();
+  EXPECT_TRUE(inside);
+}
+
+TEST_P(StoreConformance, TextsOfAllAlphabetsAndNumbersOfAllSizesComeBack) {
+  NewJob asked = job("Gl\xC3\xBChofen \xE7\xAA\xAF '?$1\\ \"x\"");
+  asked.recipe = R"({"a": "?", "b": "'"})";
+  const std::string id = store().create(asked).value().job.id;
+  const JobProgress progress{"stage", 3'000'000'000'000, 4'000'000'000'000, 1.0 / 3, 0.1};
+  EXPECT_EQ(store().heartbeat(claim().ref, kTestLease, progress), Beat::ok);
+  const Job read = store().get(id).value();
+  EXPECT_EQ(read.label, asked.label);
+  EXPECT_EQ(read.recipe, asked.recipe);
+  EXPECT_EQ(read.progress->done, progress.done);
+  EXPECT_EQ(read.progress->fraction, progress.fraction);
+  EXPECT_EQ(read.progress->eta_s, progress.eta_s);
+}
+
+}  // namespace
 
 }  // namespace kiln::testing

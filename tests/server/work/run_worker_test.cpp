@@ -39,7 +39,7 @@ TEST(ContentKey, DependsOnEverythingThatDecidesTheResultAndOnNothingElse) {
   inputs.scene = {"a.gltf", std::string(64, 'a')};
   inputs.resources = {{"x.bin", std::string(64, 'b')}, {"y.bin", std::string(64, 'c')}};
   Recipe recipe;
-  const std::string key = content_key(inputs, recipe);
+  const std::string key = content_key("", inputs, recipe);
 
   JobInputs same = inputs;
   same.scene.name = "b.gltf";
@@ -47,20 +47,21 @@ TEST(ContentKey, DependsOnEverythingThatDecidesTheResultAndOnNothingElse) {
   Recipe labelled = recipe;
   labelled.label = "label";
   labelled.limits.threads = 7;
-  EXPECT_EQ(content_key(same, labelled), key);
+  EXPECT_EQ(content_key("", same, labelled), key);
 
   JobInputs other = inputs;
   other.resources[0].name = "z.bin";
-  EXPECT_NE(content_key(other, recipe), key);
+  EXPECT_NE(content_key("", other, recipe), key);
   other = inputs;
   other.scene.sha256[0] = 'b';
-  EXPECT_NE(content_key(other, recipe), key);
+  EXPECT_NE(content_key("", other, recipe), key);
   other = inputs;
   other.environment = NamedBlob{"sky.hdr", std::string(64, 'd')};
-  EXPECT_NE(content_key(other, recipe), key);
+  EXPECT_NE(content_key("", other, recipe), key);
   Recipe seeded = recipe;
   seeded.seed = 1;
-  EXPECT_NE(content_key(inputs, seeded), key);
+  EXPECT_NE(content_key("", inputs, seeded), key);
+  EXPECT_NE(content_key("studio", inputs, recipe), key);
 }
 
 TEST(DiskSpace, AFolderOnADiskHasSomeOfItFree) {

@@ -69,6 +69,15 @@ class ServiceTest : public ::testing::Test {
     return job;
   }
 
+  /// What each check that is not ready says.
+  std::vector<std::string> unready() {
+    std::vector<std::string> states;
+    for (const Check& check : service_->checks()) {
+      if (!check.ready) states.push_back(check.state);
+    }
+    return states;
+  }
+
   /// Entries below a folder of the data.
   std::size_t entries(const std::string& folder) const {
     std::size_t count = 0;

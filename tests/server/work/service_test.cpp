@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/base/sha256.h"
+#include "tests/fixtures/fake_s3.h"
 #include "tests/server/work/service_fixture.h"
 
 namespace kiln::testing {
@@ -208,11 +209,26 @@ TEST_F(ServiceTest, ANearlyFullDiskRefusesUploadsAndLetsTheQueueWait) {
   EXPECT_EQ(service_->put_asset({}).error().code, "disk_full");
   const std::string id = service_->submit(job)->job.id;
   EXPECT_EQ(service_->wait_done(id, 500ms)->state, JobState::queued);
-  EXPECT_EQ(service_->unready_reasons(), (std::vector<std::string>{"the disk is nearly full: jobs wait"}));
+  EXPECT_EQ(unready(), (std::vector<std::string>{"the disk is nearly full: jobs wait"}));
   options_.soft_free_fraction = options_.hard_free_fraction = 0;
   start();
   EXPECT_EQ(service_->wait_done(id, 20s)->state, JobState::succeeded);
-  EXPECT_TRUE(service_->unready_reasons().empty());
+  EXPECT_TRUE(unready().empty());
+}
+
+TEST_F(ServiceTest, AJobWhoseInputsComeSlowlyKeepsItsLease) {
+  FakeS3 store;
+  options_.stores.blobs = std::string("s3://") + FakeS3::kBucket;
+  options_.stores.s3_endpoint = store.endpoint();
+  options_.stores.s3_key = options_.stores.s3_secret = "fake";
+  options_.lease = 1s;
+  open();
+  const std::string id = submit("ok").id;
+  store.trouble(FakeS3::Trouble::stalled, 1);  // three seconds for the first input
+  service_->start();
+  const Job job = service_->wait_done(id, 20s).value();
+  EXPECT_EQ(job.state, JobState::succeeded);
+  EXPECT_EQ(job.attempt, 1) << "the lease ended while the input came";
 }
 
 TEST_F(ServiceTest, AnUnusedAssetIsCollectedAndAUsedOneIsNot) {
@@ -223,10 +239,10 @@ TEST_F(ServiceTest, AnUnusedAssetIsCollectedAndAUsedOneIsNot) {
   for (int i = 0; i < 100 && std::filesystem::exists(options_.data / "cas" / unused.substr(0, 2) / unused); ++i) {
     std::this_thread::sleep_for(50ms);
   }
-  EXPECT_FALSE(service_->has_asset(unused));
+  EXPECT_FALSE(service_->has_asset(unused, {}));
   EXPECT_FALSE(std::filesystem::exists(options_.data / "cas" / unused.substr(0, 2) / unused));
   EXPECT_TRUE(service_->open_artifact(job.id, "scene.glb"));
-  EXPECT_TRUE(service_->has_asset(job.inputs.scene.sha256));
+  EXPECT_TRUE(service_->has_asset(job.inputs.scene.sha256, {}));
 }
 
 TEST_F(ServiceTest, APlanRunsInAProcessOfItsOwn) {

@@ -8,7 +8,7 @@
 
 #include "server/jobs/event.h"
 #include "server/jobs/job_store.h"
-#include "server/jobs/sqlite_db.h"
+#include "server/jobs/sql.h"
 
 namespace kiln::sql {
 
@@ -16,17 +16,17 @@ namespace kiln::sql {
 extern const char* const kJobColumns;
 
 /// The current row as a job, without its inputs and artefacts.
-Job read_job(const Rows&);
+Job read_job(const Row&);
 
 /// Inputs and artefacts of a job that read_job() began.
-Result<void> read_lists(Database&, Job&);
+Result<void> read_lists(Connection&, Job&);
 
-/// One job with everything; nothing when there is none.
-Result<std::optional<Job>> find_job(Database&, const std::string& id);
+/// One job with everything; nothing when there is none. `keep_rows`: see Engine.
+Result<std::optional<Job>> find_job(Connection&, const std::string& id, const char* keep_rows = "");
 
-Result<void> insert_inputs(Database&, const Job&);
-Result<void> insert_artifacts(Database&, const std::string& job_id, std::span<const Artifact>, std::int64_t fence);
-Result<std::vector<Artifact>> find_artifacts(Database&, const std::string& job_id);
+Result<void> insert_inputs(Connection&, const Job&);
+Result<void> insert_artifacts(Connection&, const std::string& job_id, std::span<const Artifact>, std::int64_t fence);
+Result<std::vector<Artifact>> find_artifacts(Connection&, const std::string& job_id);
 
 struct NewEvent {
   std::string job_id;
@@ -35,6 +35,6 @@ struct NewEvent {
   std::string message;
 };
 /// Appends an event and makes it the job's version.
-Result<std::uint64_t> append_event(Database&, const NewEvent&, std::int64_t now_ms);
+Result<std::uint64_t> append_event(Connection&, const NewEvent&, std::int64_t now_ms);
 
 }  // namespace kiln::sql

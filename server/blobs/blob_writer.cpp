@@ -1,4 +1,4 @@
-// One blob on its way out or in.
+#include "server/blobs/blob_writer.h"
 
 #include <utility>
 
@@ -6,33 +6,6 @@
 #include "server/blobs/blob_store.h"
 
 namespace kiln {
-
-BlobReader::BlobReader(BlobReader&& other) noexcept
-    : files_(other.files_), fd_(std::exchange(other.fd_, -1)), size_(other.size_) {}
-
-BlobReader& BlobReader::operator=(BlobReader&& other) noexcept {
-  std::swap(files_, other.files_);
-  std::swap(fd_, other.fd_);
-  std::swap(size_, other.size_);
-  return *this;
-}
-
-BlobReader::~BlobReader() {
-  if (fd_ >= 0) files_->close(fd_);
-}
-
-Result<std::size_t> BlobReader::read(std::uint64_t offset, std::span<std::uint8_t> out) const {
-  std::size_t filled = 0;
-  while (filled < out.size()) {
-    const auto at = static_cast<std::int64_t>(offset + filled);
-    const ssize_t got =
-        retry_interrupted([&] { return files_->pread(fd_, out.data() + filled, out.size() - filled, at); });
-    if (got < 0) return io_fault(errno, "read a blob");
-    if (got == 0) break;
-    filled += static_cast<std::size_t>(got);
-  }
-  return filled;
-}
 
 BlobWriter::BlobWriter(BlobStore& store, std::filesystem::path tmp, int fd, std::string expected)
     : store_(&store), tmp_(std::move(tmp)), fd_(fd), expected_(std::move(expected)) {}
@@ -50,15 +23,13 @@ BlobWriter::~BlobWriter() {
   if (expected_.empty()) {
     discard();
   } else {  // kept: the rest may still come
-    store_->files_->close(fd_);
-    store_->release_name(expected_);
+    store_->files().close(fd_);
   }
 }
 
 void BlobWriter::discard() {
-  store_->files_->close(std::exchange(fd_, -1));
-  store_->files_->unlink(tmp_);
-  if (!expected_.empty()) store_->release_name(expected_);
+  store_->files().unlink(tmp_);  // while the lock holds: nobody else may have taken the name
+  store_->files().close(std::exchange(fd_, -1));
 }
 
 Result<void> BlobWriter::write(std::span<const std::uint8_t> bytes) {
@@ -66,7 +37,7 @@ Result<void> BlobWriter::write(std::span<const std::uint8_t> bytes) {
   std::size_t written = 0;
   while (written < bytes.size()) {
     const ssize_t put =
-        retry_interrupted([&] { return store_->files_->write(fd_, bytes.data() + written, bytes.size() - written); });
+        retry_interrupted([&] { return store_->files().write(fd_, bytes.data() + written, bytes.size() - written); });
     if (put < 0) {
       auto failed = io_fault(errno, "write a blob");
       discard();
@@ -86,15 +57,14 @@ Result<StoredBlob> BlobWriter::finish() {
     discard();
     return fault("hash_mismatch", "the bytes hash to " + sha256 + ", not to the name they were sent under", expected_);
   }
-  if (store_->files_->fsync(fd_) != 0) {
+  if (store_->files().fsync(fd_) != 0) {
     auto failed = io_fault(errno, "make a blob durable");
     discard();
     return failed;
   }
-  const int closed = store_->files_->close(std::exchange(fd_, -1));
-  auto stored = closed == 0 ? store_->publish(tmp_, sha256, bytes_) : io_fault(errno, "close a blob");
-  if (!stored) store_->files_->unlink(tmp_);
-  if (!expected_.empty()) store_->release_name(expected_);
+  auto stored = store_->publish(tmp_, sha256, bytes_);  // the lock holds on: nobody goes on with this file
+  if (!stored) store_->files().unlink(tmp_);
+  store_->files().close(std::exchange(fd_, -1));
   return stored;
 }
 

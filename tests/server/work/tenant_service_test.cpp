@@ -1,0 +1,91 @@
+// One tenant sees nothing of another: jobs, assets, events, keys.
+
+#include "server/work/tenant_service.h"
+
+#include "tests/server/work/service_fixture.h"
+
+namespace kiln::testing {
+namespace {
+
+class TenantTest : public ServiceTest {
+ protected:
+  TenantTest() : a_(start(), "a", 2), b_(*service_, "b", 0) {}
+
+  static std::string put_for(Service& service, const std::string& text) {
+    auto upload = service.put_asset({}).value();
+    EXPECT_TRUE(upload->write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
+    return upload->finish().value().sha256;
+  }
+  Submission scene_of(Service& service, const std::string& label) {
+    Submission job;
+    job.scene_sha256 = put_for(service, "the scene");
+    job.recipe.steps = {PrtStep{}};
+    job.recipe.label = label;
+    return job;
+  }
+
+  TenantService a_, b_;
+};
+
+TEST_F(TenantTest, AnothersJobIsNotFoundWhateverIsAskedOfIt) {
+  const std::string id = a_.submit(scene_of(a_, "ok"))->job.id;
+  ASSERT_EQ(a_.wait_done(id, 20s)->state, JobState::succeeded);
+  const std::string name = a_.get(id)->artifacts.at(0).name;
+  EXPECT_TRUE(a_.open_artifact(id, name));
+  EXPECT_EQ(b_.get(id).error().code, "not_found");
+  EXPECT_EQ(b_.cancel(id).error().code, "not_found");
+  EXPECT_EQ(b_.remove(id).error().code, "not_found");
+  EXPECT_EQ(b_.wait_done(id, 0ms).error().code, "not_found");
+  EXPECT_EQ(b_.wait_change(id, 0, 0ms).error().code, "not_found");
+  EXPECT_EQ(b_.subscribe(id, 0).error().code, "not_found");
+  EXPECT_EQ(b_.open_artifact(id, name).error().code, "not_found");
+  EXPECT_TRUE(b_.list({})->jobs.empty());
+  EXPECT_EQ(a_.list({})->jobs.size(), 1U);
+  EXPECT_EQ(service_->list({})->jobs.size(), 1U) << "the one who sees all sees it";
+}
+
+TEST_F(TenantTest, AnothersAssetCannotBeReadUsedOrSeenToBeThere) {
+  const std::string sha256 = put_for(a_, "a secret scene");
+  EXPECT_TRUE(a_.has_asset(sha256, {}));
+  EXPECT_FALSE(b_.has_asset(sha256, {}));
+  EXPECT_FALSE(b_.open_asset(sha256));
+  Submission stolen = scene_of(b_, "ok");
+  stolen.scene_sha256 = sha256;
+  EXPECT_EQ(b_.submit(stolen).error().code, "asset_not_found");
+  EXPECT_EQ(b_.plan(stolen).error().code, "asset_not_found");
+}
+
+TEST_F(TenantTest, TheSameSceneAndRecipeIsBakedForEachAndAnsweredFromTheOwnResult) {
+  const std::string first = a_.submit(scene_of(a_, "ok"))->job.id;
+  ASSERT_EQ(a_.wait_done(first, 20s)->state, JobState::succeeded);
+  EXPECT_FALSE(b_.submit(scene_of(b_, "ok"))->job.cached) << "it would tell that somebody baked it";
+  EXPECT_TRUE(a_.submit(scene_of(a_, "ok"))->job.cached);
+}
+
+TEST_F(TenantTest, AStreamOfAllEventsHoldsOnlyTheTenants) {
+  auto stream = b_.subscribe("", 0).value();
+  a_.submit(scene_of(a_, "ok")).value();
+  const std::string own = b_.submit(scene_of(b_, "ok"))->job.id;
+  ASSERT_EQ(b_.wait_done(own, 20s)->state, JobState::succeeded);
+  int events = 0;
+  while (const auto event = stream->next(200ms)) {
+    EXPECT_EQ(event->job_id, own);
+    ++events;
+  }
+  EXPECT_GE(events, 4);
+}
+
+TEST_F(TenantTest, AQuotaOfJobsHoldsForOneTenantAlone) {
+  for (int i = 0; i < 2; ++i) {
+    Submission job = scene_of(a_, "hang");
+    job.recipe.seed = static_cast<std::uint64_t>(i);
+    EXPECT_TRUE(a_.submit(job));
+  }
+  Submission third = scene_of(a_, "hang");
+  third.recipe.seed = 9;
+  EXPECT_EQ(a_.submit(third).error().code, "quota");
+  EXPECT_TRUE(b_.submit(scene_of(b_, "ok")));
+}
+
+}  // namespace
+}  // namespace kiln::testing
