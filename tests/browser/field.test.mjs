@@ -431,7 +431,7 @@ test('the panel tells degree, bytes, and what the report certifies', () =>
     await page.getByText('Statistics').click();
     const text = await page.locator('.statistics').innerText();
     assert.match(text, /4: 25 × RGB a vertex/);
-    const total = (await vertices(page)) * 16 * texelsOf(4);
+    const total = (await vertices(page)) * 16 * texelsOf({ degree: 4, sky: false });
     assert.match(text, new RegExp(`On the graphics card\\s+${(total / 1000).toPrecision(3)} kB`));
     assert.match(text, /towards random eyes\s+5\.0\u00a0% \(95\u00a0%: 4\.5\u00a0% to 6\.0\u00a0%\)/);
     assert.match(text, /1,013 points, 64 paths each/);
