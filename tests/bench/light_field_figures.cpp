@@ -82,7 +82,7 @@ Seen look(const LitMesh& lit, const Window& window, Threads& threads) {
         const SurfacePoint at = surface_point(scene, hit.triangle, hit.u, hit.v);
         const Vec3d normal = normalized(to_double(at.normal));
         out.radiance[i] +=
-            seen_radiance(lit.field, lit.mesh.triangles[hit.triangle], hit.u, hit.v, normal, window.back) *
+            seen_radiance(lit.field, nullptr, {lit.mesh.triangles[hit.triangle], hit.u, hit.v, normal, window.back}) *
             (1.0 / (kGrid * kGrid));
       }
     }

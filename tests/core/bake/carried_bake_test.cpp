@@ -79,7 +79,7 @@ TEST(CarriedBake, SimplifiesWithoutARayAndLevelsGetWorse) {
   BakedScene shown;
   shown.scene.mesh = std::move(finest.mesh), shown.field = std::move(finest.field);
   Threads threads(2);
-  const double error = certify_carried({shown, input->scene.mesh, input->field, 0}, threads).radiance.relrmse;
+  const double error = certify_carried({shown, input->scene, input->field, input->sky, 0}, threads).radiance.relrmse;
   std::printf("finest level of the progressive mesh %.4f\n", error);
   EXPECT_LT(error, 1.1 * field["levels"][0]["certificate"]["relrmse"].get<double>());  // other points: 2 %
 }
@@ -210,7 +210,7 @@ TEST(CarriedCertificate, IsTheDistanceOfEquation5WhereNormalsAgree) {
   const double expected =
       std::sqrt(squared_norm(norm, {0, 0, 1}, difference) / 3) / double{(mean.x + mean.y + mean.z) / 3};
   Threads threads(2);
-  const ErrorStats error = certify_carried({shown, mesh, truth, 3}, threads).radiance;
+  const ErrorStats error = certify_carried({shown, shown.scene, truth, shown.sky, 3}, threads).radiance;
   EXPECT_NEAR(error.relrmse / expected, 1, 0.02);  // 8192 eyes, squares that spread as much as they are: 1.1 % / 2
   EXPECT_LE(error.interval_low, expected);
   EXPECT_GE(error.interval_high, expected);
