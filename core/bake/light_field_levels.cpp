@@ -60,8 +60,7 @@ double rms_over_mean(const Mesh& mesh, const LightField& field) {
   }
   double squares = 0, mean = 0, all = 0;
   for (std::size_t v = 0; v < area.size(); ++v) {
-    const std::span<const float> c = field.of(v);
-    const std::vector<double> rgb(c.begin(), c.end());
+    const std::vector<double> rgb = mean_light(field, v);
     squares += area[v] * squared_norm(norm, to_double(mesh.normal[v]), rgb) / 3;
     mean += area[v] * (rgb[0] + rgb[count] + rgb[2 * count]) / (3 * 2 * std::sqrt(std::numbers::pi));
     all += area[v];

@@ -158,7 +158,10 @@ TransferEncoding choose_field_encoding(const LightField& field, const Mesh& mesh
   shape.coefficients = field.coefficients;
   // The metric of components is made for light of mean 1.
   double sum = 0;
-  for (std::size_t i = 0; i < shape.coefficients.size(); i += field.count()) sum += double{shape.coefficients[i]};
+  for (std::size_t v = 0; v < field.vertices(); ++v) {
+    const std::vector<double> rgb = mean_light(field, v);
+    sum += rgb[0] + rgb[field.count()] + rgb[2 * field.count()];
+  }
   const double mean = std::abs(sum) / static_cast<double>(3 * field.vertices());
   const auto scale = static_cast<float>(mean > 1e-30 ? 1 / mean : 1);
   for (float& c : shape.coefficients) c *= scale;

@@ -50,8 +50,7 @@ SkyDecision decide_sky(const Scene& scene, const Environment* sky, int degree, d
   if (asked == SkyPart::series) return {false, because};
   const double smooth = least_roughness(scene);
   const std::string roughness = "roughness " + short_text(smooth);
-  if (!(share_apart(smooth, degree) > 0))
-    return {false, "the smoothest surface has " + roughness + ": the series holds it"};
+  if (!(share_apart(smooth) > 0)) return {false, "the smoothest surface has " + roughness + ": the series holds it"};
   if (asked == SkyPart::apart) return {true, because};
   const double left = left_by_bands(*sky, degree);
   const std::string bands = std::to_string(degree + 1) + " bands leave " + short_text(100 * left) + " % of the sky out";

@@ -23,6 +23,7 @@ namespace {
 constexpr int kSets = 8, kBatch = 4;
 constexpr std::size_t kBlock = 64;
 constexpr double kEven = 0.5 / std::numbers::pi;  // density of a vertex' rays
+constexpr double kWhite = 3.5449077018110318;     // 2 sqrt(pi): coefficient of a constant 1
 
 /// What a vertex is made of.
 struct VertexMaterial {
@@ -150,11 +151,81 @@ struct SharpVertex {
   Vec3f f0;
 };
 
+struct VertexResult {
+  double noise = 0, mean = 0;  // mean square over eyes and channels; radiance
+  SharpVertex sharp;
+};
+
+/// Fits what each vertex sends.
+class VertexBake {
+ public:
+  VertexBake(const IncidentLight::World& world, const OutgoingBake& params, Threads& threads)
+      : world_(world),
+        apart_(params.sky_apart && world.sky != nullptr),
+        fits_(params.degree, threads),
+        norm_(params.degree),
+        gather_(world, params) {
+    if (apart_) sky_level_ = project_environment(*world.sky, 1)[0] / static_cast<float>(kWhite);
+  }
+
+  bool sky_apart() const { return apart_; }
+
+  /// Writes the vertex' part of the field; its `face` says what it is made of. Adds to `rays`.
+  VertexResult bake(std::uint32_t v, std::uint32_t face, const TransferPoint& point, const Vec3f& value,
+                    LightField& out, std::uint64_t& rays) const {
+    const VertexMaterial material = material_at(world_.tracer.scene(), v, face);
+    const LobeFit fit = fits_.at(material.roughness);
+    const std::vector<Look> looks = gather_.looks(point, rays);
+    const double apart = apart_ ? share_apart(material.roughness) : 0;
+    VertexResult result;
+    SkyVisibility visibility{};
+    if (apart > 0) {
+      visibility = visibility_of(looks, apart);
+      std::ranges::copy(visibility, &out.visibility[kVisibilityCount * v]);
+      result.sharp = {apart, ggx_alpha(material.roughness), material.f0};
+    }
+    Halves halves{{LobeSum(fit), LobeSum(fit)}};
+    halves.add(looks, apart > 0 ? &visibility : nullptr, basis_around(point.normal));
+    const std::span<float> all = out.of(v);
+    result.noise = mix_halves(halves, material, material.below * value, all);
+    for (std::size_t c = 0; c < 3; ++c) {
+      float* series = &all[c * out.count()];
+      rotate_sh(fits_.degree() + 1, basis_around(point.normal), series, series);
+      series[0] += material.emission[c] * static_cast<float>(kWhite);
+      const double mirrored = double{visibility[0]} * double{material.f0[c] * sky_level_[c]};
+      result.mean += (double{series[0]} + mirrored) / (kWhite * 3);
+    }
+    return result;
+  }
+
+ private:
+  /// The mean of both halves, each of which stands for half of the light; returns the noise of it.
+  double mix_halves(const Halves& halves, const VertexMaterial& material, const Vec3f& below,
+                    std::span<float> all) const {
+    std::vector<float> half(all.size());
+    halves.sums[0].finish(material.f0, below, 2, all);
+    halves.sums[1].finish(material.f0, below, 2, half);
+    std::vector<double> off(all.size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      off[k] = 0.5 * (double{all[k]} - double{half[k]});
+      all[k] = 0.5F * (all[k] + half[k]);
+    }
+    return squared_norm(norm_, {0, 0, 1}, off) / 3;
+  }
+
+  const IncidentLight::World& world_;
+  bool apart_;
+  LobeFits fits_;
+  HemisphereNorm norm_;
+  Gather gather_;
+  Vec3f sky_level_;
+};
+
 /// The blurred skies that those vertices need, and what their visibility stands for in the mean.
-void add_sky(const Environment& sky, std::span<const SharpVertex> sharp, OutgoingLight& out, Threads& threads) {
+void add_sky(const Environment& sky, std::span<const VertexResult> vertices, OutgoingLight& out, Threads& threads) {
   double least = 1, all = 0;
   Vec3d f0;
-  for (const SharpVertex& v : sharp) {
+  for (const auto& [noise, mean, v] : vertices) {
     if (!(v.share > 0)) continue;
     least = std::min(least, v.alpha);
     f0 += to_double(v.f0) * v.share;
@@ -174,75 +245,39 @@ void add_sky(const Environment& sky, std::span<const SharpVertex> sharp, Outgoin
 
 }  // namespace
 
-double share_apart(double roughness, int /*degree*/) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
+double share_apart(double roughness) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
 
 OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const Vec3f> value, const OutgoingBake& params,
                             Threads& threads) {
   const Scene& scene = world.tracer.scene();
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
-  const bool sky_apart = params.sky_apart && world.sky != nullptr;
-  const LobeFits fits(params.degree, threads);
-  const HemisphereNorm norm(params.degree);
-  const Gather gather(world, params);
+  const VertexBake vertex(world, params, threads);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
   const std::vector<std::uint32_t> order = morton_order_of(points);
   OutgoingLight out;
   out.field.degree = params.degree;
-  const std::size_t numbers = 3 * out.field.count();
-  out.field.coefficients.resize(numbers * points.size());
-  if (sky_apart) out.field.visibility.resize(kVisibilityCount * points.size());
-  std::vector<double> noise(points.size()), mean(points.size());
-  std::vector<SharpVertex> sharp(points.size());
+  out.field.coefficients.resize(3 * out.field.count() * points.size());
+  if (vertex.sky_apart()) out.field.visibility.resize(kVisibilityCount * points.size());
+  std::vector<VertexResult> results(points.size());
   std::atomic<std::uint64_t> rays = 0, done = 0;
   threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::uint64_t own = 0;
-    std::vector<float> half(numbers);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t v = order[i];
-      const VertexMaterial material = material_at(scene, v, faces[v]);
-      const LobeFit fit = fits.at(material.roughness);
-      const Basis<float> basis = basis_around(points[v].normal);
-      const std::vector<Look> looks = gather.looks(points[v], own);
-      SkyVisibility visibility{};
-      const double apart = sky_apart ? share_apart(material.roughness, params.degree) : 0;
-      if (apart > 0) {
-        visibility = visibility_of(looks, apart);
-        std::ranges::copy(visibility, &out.field.visibility[kVisibilityCount * v]);
-        sharp[v] = {apart, ggx_alpha(material.roughness), material.f0};
-      }
-      Halves halves{{LobeSum(fit), LobeSum(fit)}};
-      halves.add(looks, apart > 0 ? &visibility : nullptr, basis);
-      // The mean of both halves, each of which stands for half of the light.
-      const Vec3f below = material.below * value[v];
-      const std::span<float> all = out.field.of(v);
-      halves.sums[0].finish(material.f0, below, 2, all);
-      halves.sums[1].finish(material.f0, below, 2, half);
-      constexpr double kWhite = 3.5449077018110318;  // 2 sqrt(pi): coefficient of a constant 1
-      std::vector<double> off(numbers);
-      for (std::size_t k = 0; k < numbers; ++k) {
-        off[k] = 0.5 * (double{all[k]} - double{half[k]});
-        all[k] = 0.5F * (all[k] + half[k]);
-      }
-      noise[v] = squared_norm(norm, {0, 0, 1}, off) / 3;
-      for (std::size_t c = 0; c < 3; ++c) {
-        float* series = &all[c * out.field.count()];
-        rotate_sh(params.degree + 1, basis, series, series);
-        series[0] += material.emission[c] * static_cast<float>(kWhite);
-        mean[v] += double{series[0]} / (kWhite * 3);
-      }
+      results[v] = vertex.bake(v, faces[v], points[v], value[v], out.field, own);
     }
     rays += own;
     done += end - begin;
     if (params.progress) params.progress(done, points.size());
   });
   out.rays = rays;
-  if (sky_apart) add_sky(*world.sky, sharp, out, threads);
   double squares = 0, sum = 0;
-  for (std::size_t v = 0; v < points.size(); ++v) squares += noise[v], sum += mean[v];
+  for (const VertexResult& v : results) squares += v.noise, sum += v.mean;
   const auto n = static_cast<double>(std::max<std::size_t>(1, points.size()));
   out.noise = sum > 0 ? std::sqrt(squares / n) / (sum / n) : 0;
+  if (vertex.sky_apart()) add_sky(*world.sky, results, out, threads);
   return out;
 }
 

@@ -4,7 +4,8 @@
 // value: diffuse light of the vertex, given (radiosity, or any other); below: reflectance of the diffuse layer. f is
 // glTF's GGX lobe (core/trace/ggx.h). What arrives is traced once for each vertex and fitted for all eyes
 // (lobe_fits.h): rays even over the half space, and what they would find badly beside them
-// (core/meshless/incident_light.h). Paper   Vanhoey et al. 2015, whose input was fitted to photographs. Units   W m^-2
+// (core/meshless/incident_light.h). Where the sky is kept apart, rays bring what differs from the sky behind what the
+// vertex sees of it. Paper   Vanhoey et al. 2015, whose input was fitted to photographs. Units   W m^-2
 // sr^-1; lengths of the unit cube.   Error  that of the rays (`noise`) and of the fit; unbiased but for the
 //         lit surface that rays look at
 // Cost    vertices x rays closest-hit rays, twice that where a sky has bright parts or the scene emitters
@@ -24,7 +25,7 @@ struct OutgoingBake {
   int degree = 4;   // 0 .. kMaxLightFieldDegree
   int rays = 1024;  // of a vertex; rounded up to a multiple of 128
   std::uint64_t seed = 0;
-  /// Keeps the sky apart where a vertex is so smooth that the series cannot hold it (light_field.h, mirrored_sky.h).
+  /// Keeps the sky apart where a vertex is smooth (share_apart, light_field.h, mirrored_sky.h).
   bool sky_apart = false;
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // vertices
 };
@@ -36,8 +37,9 @@ struct OutgoingLight {
   std::uint64_t rays = 0;
 };
 
-/// How much of the sky is kept apart at a roughness, 1 to 0: by a series of this degree.
-double share_apart(double roughness, int degree);
+/// How much of the sky is kept apart at a roughness: all of it to .45, nothing from .65 on, where series hold it as
+/// well.
+double share_apart(double roughness);
 
 /// `value` of each vertex of the world's mesh.
 OutgoingLight bake_outgoing(const IncidentLight::World&, std::span<const Vec3f> value, const OutgoingBake&, Threads&);
