@@ -184,6 +184,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   std::optional<Mesh> unmerged;
   if (plan.merge) unmerged = scene.mesh;
   if (carried) {
+    own.name = "that of the file";
     transport.transfer = in.diffuse;
     outgoing.emplace(OutgoingLight{.field = in.field, .sky = in.sky});
   } else if (plan.radiosity) {

@@ -21,6 +21,7 @@ void warn_of_unused(const LightFieldStep& step, bool sky, Plan& plan) {
     if (asked) unused += (unused.empty() ? "" : ", ") + std::string(name);
   };
   list(step.basis != RadianceBasis::harmonics, "basis");
+  list(step.sky != SkyPart::automatic, "sky");
   list(step.degree.has_value(), "degree");
   list(step.rays.has_value(), "rays");
   list(step.surface.bounces.has_value(), "bounces");
