@@ -104,8 +104,9 @@ Environment blur(const SkyPyramid& sky, double alpha, Threads& threads) {
   out.radiance.resize(width * static_cast<std::size_t>(height));
   threads.for_blocks(static_cast<std::size_t>(height), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin * width; i < end * width; ++i) {
-      const double up = kPi * (0.5 - (static_cast<double>(i / width) + 0.5) / height);
-      const double around = 2 * kPi * ((static_cast<double>(i % width) + 0.5) / out.width - 0.5);
+      const std::size_t row = i / width, column = i % width;
+      const double up = kPi * (0.5 - (static_cast<double>(row) + 0.5) / height);
+      const double around = 2 * kPi * ((static_cast<double>(column) + 0.5) / out.width - 0.5);
       const Basis<double> frame =
           basis_around(Vec3d{std::cos(up) * std::cos(around), std::sin(up), std::cos(up) * std::sin(around)});
       Vec3d sum;
