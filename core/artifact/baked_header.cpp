@@ -140,6 +140,9 @@ void read_sky(const json& root, const Fields& extension, BakedHeader& out, Findi
   const auto c = numbers(at(root, mean), mean, 3, findings);
   if (findings.failed()) return;
   sky.mean = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+  sky.slope = fields.number("slope", 0);
+  if (!(sky.slope >= 0 && sky.slope <= kLargest))
+    return findings.fail("number_out_of_range", "A slope is not below zero.", fields.pointer("slope"));
   out.sky = std::move(sky);
 }
 

@@ -32,6 +32,7 @@ struct BakedHeader {
     PackedSky levels;   // without texels
     int levels_view = -1;
     Vec3f mean;
+    double slope = 0;
   };
   std::optional<Sky> sky;
   GlossyTransfer glossy;  // its shape; of rank 0 (and order 0) where there are no matrices

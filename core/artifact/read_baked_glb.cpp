@@ -296,7 +296,11 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.field = {.degree = std::max(0, field.series.order - 1),
                .coefficients = std::move(field.series.coefficients),
                .visibility = std::move(field.visibility.coefficients),
-               .sky = file.header.sky ? file.header.sky->mean : Vec3f{}};
+               .sky = {}};
+  if (file.header.sky) {
+    out.field.sky = file.header.sky->mean;
+    out.field.sky_slope = static_cast<float>(file.header.sky->slope);
+  }
   out.sky = file.sky;
   const auto finite = [](float c) { return std::isfinite(c); };
   if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite) ||

@@ -188,7 +188,8 @@ class Writer {
   json sky_extension() const {
     json out = {{"levels", {{"heights", sky_.heights}, {"unit", sky_.unit}, {"bufferView", *sky_view_}}},
                 {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *sky_lobes_}}},
-                {"mean", vec(baked_.field.sky)}};
+                {"mean", vec(baked_.field.sky)},
+                {"slope", baked_.field.sky_slope}};
     put_form(out, field_->visibility()->form(), {}, sky_name);
     return out;
   }

@@ -86,7 +86,13 @@ void CollapseCost::update_vertex(std::uint32_t v) {
     for (const std::uint32_t x : {a, b})
       if (std::ranges::find(g.ring, x) == g.ring.end()) g.ring.push_back(x);
   });
-  products_.of_differences(v, g.ring, normalized(to_double(mesh_.mesh().normal[v])), g.product);
+  const std::vector<Vec3f>& normal = mesh_.mesh().normal;
+  products_.of_differences(v, g.ring, normalized(to_double(normal[v])), g.product);
+  const float slope = mesh_.lit().field.sky_slope;  // a mirror that turns shows another part of the sky
+  if (!(slope > 0)) return;
+  for (std::size_t i = 0, at = 0; i < g.ring.size(); ++i)
+    for (std::size_t k = 0; k <= i; ++k, ++at)
+      g.product[at] += slope * dot(normal[g.ring[i]] - normal[v], normal[g.ring[k]] - normal[v]);
 }
 
 double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const {

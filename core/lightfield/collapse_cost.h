@@ -7,6 +7,7 @@
 // L_t(p0) is extrapolated (4): weights of t's corners that sum to one. So d^2 is a quadratic form in those weights
 // whose matrix holds the products of the differences between p0's neighbours and p0 on p0's hemisphere. That Gram
 // matrix is kept for each vertex; a candidate then costs no integral at all, whatever the degree.
+// Where the field keeps the sky apart, differences of normals times the sky's slope (light_field.h) belong to them.
 // Both are memoryless: of the mesh as it is now.
 // Paper    Vanhoey et al. 2015, section 4; Hoppe 1999 (memoryless quadrics)
 // Units    cost is a share of a squared relative error; u is kLengthUnit of the diagonal of the mesh's box

@@ -35,7 +35,8 @@ struct LightField {
   int degree = 4;                   // bands 0 .. degree, (degree + 1)^2 coefficients of each channel
   std::vector<float> coefficients;  // of one channel after the other, for each vertex
   std::vector<float> visibility;    // of the sky: kVisibilityCount harmonics for each vertex, or empty
-  Vec3f sky;                        // what a visibility of 1 adds, in the mean: for distances only
+  Vec3f sky;                        // what a visibility of 1 adds, in the mean: for distances only,
+  float sky_slope = 0;              // and the mean square of how that changes with the normal, RGB, per square radian
   std::size_t channels = 3;
   std::size_t noise = 0;
 

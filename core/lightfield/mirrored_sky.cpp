@@ -151,6 +151,25 @@ SkyLevels blur_sky(const Environment& sky, double least, Threads& threads) {
   return out;
 }
 
+double mean_square_slope(const Environment& level, double over) {
+  double squares = 0, all = 0;
+  for (int y = 0; y < level.height; ++y) {
+    const double up = kPi * (0.5 - (y + 0.5) / level.height), sine = std::cos(up);
+    for (int x = 0; x < level.width; ++x) {
+      const double around = 2 * kPi * ((x + 0.5) / level.width - 0.5);
+      const Vec3d w{sine * std::cos(around), std::sin(up), sine * std::sin(around)};
+      const Basis<double> frame = basis_around(w);
+      for (const Vec3d& aside : {frame.x, frame.y}) {
+        const Vec3d there = w * std::cos(over) + aside * std::sin(over);
+        const Vec3f off = environment_radiance(level, to_float(there)) - environment_radiance(level, to_float(w));
+        squares += sine * double{dot(off, off)};
+      }
+      all += sine;
+    }
+  }
+  return squares / (all * over * over);
+}
+
 MirroredSky::MirroredSky(const SkyLevels& levels) : levels_(levels), lobes_(make_lobe_table(1)) {
   EXPECTS(levels.size() >= 2);
 }

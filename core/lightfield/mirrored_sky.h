@@ -28,6 +28,10 @@ using SkyLevels = std::vector<Environment>;
 /// Down to alpha `least`, in maps of at most 512 x 256 texels.
 SkyLevels blur_sky(const Environment&, double least, Threads&);
 
+/// Mean square of how a map changes over so many radians, per square radian, summed over R, G and B: over all
+/// directions.
+double mean_square_slope(const Environment& level, double over);
+
 class MirroredSky {
  public:
   /// Expects at least two levels, and keeps a reference to them.

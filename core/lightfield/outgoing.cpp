@@ -221,14 +221,17 @@ class VertexBake {
   Vec3f sky_level_;
 };
 
-/// The blurred skies that those vertices need, and what their visibility stands for in the mean.
+/// The blurred skies that those vertices need, and what distances need to know of them.
 void add_sky(const Environment& sky, std::span<const VertexResult> vertices, OutgoingLight& out, Threads& threads) {
-  double least = 1, all = 0;
+  constexpr std::size_t kSlopeLevel = 2;  // alpha .5
+  constexpr double kTurn = 0.3;           // of the mirror direction, where vertices are few
+  double least = 1, all = 0, squared_f0 = 0;
   Vec3d f0;
   for (const auto& [noise, mean, v] : vertices) {
     if (!(v.share > 0)) continue;
     least = std::min(least, v.alpha);
     f0 += to_double(v.f0) * v.share;
+    squared_f0 += double{dot(v.f0, v.f0)} / 3 * v.share;
     all += v.share;
   }
   if (!(all > 0)) {
@@ -236,11 +239,14 @@ void add_sky(const Environment& sky, std::span<const VertexResult> vertices, Out
     return;
   }
   out.sky = blur_sky(sky, least / 2, threads);
-  const Environment& level = out.sky[std::min<std::size_t>(out.sky.size() - 1, 4)];
+  // Surfaces that are smoother than this find less: what is finer is off by all it has, and not by its slope.
+  const Environment& level = out.sky[std::min<std::size_t>(out.sky.size() - 1, kSlopeLevel)];
   Vec3d squares;
   for (const Vec3f& c : level.radiance) squares += to_double(c) * to_double(c);
   squares = squares / static_cast<double>(level.radiance.size());
   out.field.sky = to_float(f0 / all * Vec3d{std::sqrt(squares.x), std::sqrt(squares.y), std::sqrt(squares.z)});
+  // The mirror direction turns by 2 in the plane of the eye and 2 cos across it: 8/3 in the mean square over eyes.
+  out.field.sky_slope = static_cast<float>(8.0 / 3 * squared_f0 / all * mean_square_slope(level, kTurn));
 }
 
 }  // namespace

@@ -34,6 +34,12 @@ Bytes with_json(const Bytes& file, const std::string& from, const std::string& t
   return *join_glb(text, Bytes(chunks->binary.begin(), chunks->binary.end()));
 }
 
+/// What reading says of the file with its JSON text changed.
+std::string code_of(const Bytes& file, const std::string& from, const std::string& to) {
+  const auto read = read_baked_glb(with_json(file, from, to));
+  return read ? "read" : read.error().code;
+}
+
 TEST(LightFieldGlb, RawCoefficientsComeBackWithinHalfAStep) {
   for (const int degree : {0, 4, 8}) {
     for (const float magnitude : {1e-6F, 1.0F, 1e12F}) {
@@ -62,10 +68,7 @@ TEST(LightFieldGlb, AFileWithoutAFieldHasNone) {
 
 TEST(LightFieldGlb, WhatIsNotRightIsRefusedByName) {
   const Bytes file = *write_baked_glb(with_field(2));
-  const auto code = [&](const std::string& from, const std::string& to) -> std::string {
-    const auto read = read_baked_glb(with_json(file, from, to));
-    return read ? "read" : read.error().code;
-  };
+  const auto code = [&](const std::string& from, const std::string& to) { return code_of(file, from, to); };
   EXPECT_EQ(code("\"degree\":2", "\"degree\":3"), "slot_count_mismatch");
   EXPECT_EQ(code("\"degree\":2", "\"degree\":9"), "number_out_of_range");
   EXPECT_EQ(code("\"degree\":2", "\"degree\":-1"), "json_type");
@@ -95,6 +98,7 @@ BakedScene with_sky() {
   for (std::size_t i = 0; i < kVisibilityCount * out.scene.mesh.position.size(); ++i)
     out.field.visibility.push_back(4 * random.uniform() - 1);
   out.field.sky = {0.5F, 1, 2};
+  out.field.sky_slope = 3;
   out.sky = random_sky(100);
   return out;
 }
@@ -103,6 +107,7 @@ TEST(LightFieldGlb, ASkyThatIsKeptApartTravelsWithTheField) {
   const BakedScene written = with_sky(), read = round_trip(written);
   ASSERT_TRUE(read.field.has_sky());
   EXPECT_EQ(read.field.sky, written.field.sky);
+  EXPECT_EQ(read.field.sky_slope, written.field.sky_slope);
   const auto original = original_vertices(read);
   double worst = 0;
   for (std::size_t v = 0; v < read.field.vertices(); ++v) {
@@ -132,15 +137,13 @@ TEST(LightFieldGlb, SharedExponentsKeepABrightTexelToHalfAStep) {
 
 TEST(LightFieldGlb, ASkyThatIsNotRightIsRefusedByName) {
   const Bytes file = *write_baked_glb(with_sky());
-  const auto code = [&](const std::string& from, const std::string& to) -> std::string {
-    const auto read = read_baked_glb(with_json(file, from, to));
-    return read ? "read" : read.error().code;
-  };
+  const auto code = [&](const std::string& from, const std::string& to) { return code_of(file, from, to); };
   EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,8,32]"), "slot_count_mismatch");
   EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[16]"), "number_out_of_range");
   EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,8,99999]"), "number_out_of_range");
   EXPECT_EQ(code("\"heights\":[4,8,16]", "\"heights\":[4,-8,16]"), "number_out_of_range");
   EXPECT_EQ(code("\"_SLF_SKY_0\",\"_SLF_SKY_1\"", "\"_SLF_SKY_1\",\"_SLF_SKY_0\""), "slot_count_mismatch");
+  EXPECT_EQ(code("\"slope\":3.0", "\"slope\":-3.0"), "number_out_of_range");
   EXPECT_EQ(code("\"rows\":16", "\"rows\":15"), "slot_count_mismatch");
   EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[0.5,1.0]"), "slot_count_mismatch");
 }

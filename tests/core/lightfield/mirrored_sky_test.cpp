@@ -128,5 +128,12 @@ TEST(MirroredSky, MapsAreTheSameForAnyNumberOfThreadsAndNoFinerThanAsked) {
   for (const Environment& level : a) EXPECT_NEAR(mean(level), mean(clear_sky_with_sun()), 0.03 * mean(level));
 }
 
+/// Radiance 1 + y over the sphere: its gradient has square 1 - y^2, 2/3 in the mean, in each of three channels.
+TEST(MirroredSky, TheSlopeOfASlopeIsThat) {
+  const Environment map = averaged_sky(128, 1, [](const Vec3f& w) { return Vec3f{1, 1, 1} * (1 + w.y); });
+  EXPECT_NEAR(mean_square_slope(map, 0.02), 2, 0.02);  // bilinear look-ups
+  EXPECT_LT(mean_square_slope(map, 2), 1);             // over half the sphere it is less
+}
+
 }  // namespace
 }  // namespace kiln
