@@ -167,6 +167,59 @@ void add_assets(std::vector<Endpoint>& all) {
                  {400, 411, 413, 415, 503, 507}});
 }
 
+void add_uploads(std::vector<Endpoint>& all) {
+  all.push_back({"OPTIONS",
+                 "/v1/uploads",
+                 "uploadOptions",
+                 "uploads",
+                 "What of the tus protocol is spoken here",
+                 {},
+                 {},
+                 204,
+                 {},
+                 {}});
+  all.push_back({"POST",
+                 "/v1/uploads",
+                 "beginUpload",
+                 "uploads",
+                 "Begin an upload in pieces (tus 1.0). With the same sha256 in Upload-Metadata: find one again",
+                 {"tusResumable", "uploadLength", "uploadMetadata"},
+                 {},
+                 201,
+                 {},
+                 {400, 412, 413, 422, 429, 503, 507}});
+  all.push_back({"GET",
+                 "/v1/uploads/{upload}",
+                 "getUpload",
+                 "uploads",
+                 "Where an upload stands; HEAD tells the same by Upload-Offset and Upload-Length",
+                 {"upload"},
+                 {},
+                 200,
+                 as_json("Upload"),
+                 {404, 409, 412, 503}});
+  all.push_back({"PATCH",
+                 "/v1/uploads/{upload}",
+                 "appendUpload",
+                 "uploads",
+                 "The next bytes. With the last ones Upload-Asset names the asset that the file has become",
+                 {"upload", "tusResumable", "pieceOffset", "uploadChecksum"},
+                 {{"application/offset+octet-stream", "Binary"}},
+                 204,
+                 {},
+                 {400, 404, 409, 411, 412, 413, 415, 422, 429, 460, 503, 507}});
+  all.push_back({"DELETE",
+                 "/v1/uploads/{upload}",
+                 "deleteUpload",
+                 "uploads",
+                 "Give an upload up; an asset that it has become stays",
+                 {"upload", "tusResumable"},
+                 {},
+                 204,
+                 {},
+                 {404, 409, 412}});
+}
+
 void add_recipes(std::vector<Endpoint>& all) {
   all.push_back({"POST",
                  "/v1/plan",
@@ -224,6 +277,7 @@ std::vector<Endpoint> make_endpoints() {
   add_jobs(all);
   add_artifacts(all);
   add_assets(all);
+  add_uploads(all);
   add_recipes(all);
   add_service(all);
   add_viewer(all);

@@ -33,7 +33,17 @@ constexpr const char* kParameters = R"json({
   "download": {"name": "download", "in": "query", "schema": {"type": "integer", "enum": [1]},
     "description": "Put the job's id into the proposed file name"},
   "uploadOffset": {"name": "Upload-Offset", "in": "header", "schema": {"type": "integer", "minimum": 0},
-    "description": "Resume an interrupted upload here; must be what HEAD of the asset tells"}
+    "description": "Resume an interrupted upload here; must be what HEAD of the asset tells"},
+  "upload": {"name": "upload", "in": "path", "required": true, "schema": {"type": "string"}, "description": "Upload id"},
+  "tusResumable": {"name": "Tus-Resumable", "in": "header", "required": true, "schema": {"const": "1.0.0"}},
+  "uploadLength": {"name": "Upload-Length", "in": "header", "required": true,
+    "schema": {"type": "integer", "minimum": 1}, "description": "Bytes of the whole file"},
+  "uploadMetadata": {"name": "Upload-Metadata", "in": "header", "schema": {"type": "string", "maxLength": 4096},
+    "description": "name base64,name base64; sha256 (64 hex digits) is checked at the end"},
+  "pieceOffset": {"name": "Upload-Offset", "in": "header", "required": true, "schema": {"type": "integer", "minimum": 0},
+    "description": "Where the piece begins: what HEAD tells"},
+  "uploadChecksum": {"name": "Upload-Checksum", "in": "header", "schema": {"type": "string"},
+    "description": "sha256 or sha1 and base64 of the piece, which then counts whole or not at all"}
 })json";
 
 constexpr const char* kJobSchemas = R"json(
@@ -81,6 +91,9 @@ constexpr const char* kJobSchemas = R"json(
 constexpr const char* kOtherSchemas = R"json(
   "Asset": {"type": "object", "required": ["sha256", "bytes", "existed"], "properties": {
       "sha256": {"$ref": "#/components/schemas/Sha256"}, "bytes": {"type": "integer"}, "existed": {"type": "boolean"}}},
+  "Upload": {"type": "object", "required": ["id", "length", "offset", "expires_at", "asset"], "properties": {
+      "id": {"type": "string"}, "length": {"type": "integer"}, "offset": {"type": "integer"},
+      "expires_at": {"type": "string", "format": "date-time"}, "asset": {"type": ["string", "null"]}}},
   "PresetList": {"type": "object", "required": ["presets"], "properties": {"presets": {"type": "array", "items": {
       "type": "object", "required": ["name", "description", "recipe"], "properties": {"name": {"type": "string"},
         "description": {"type": "string"}, "recipe": {"type": "object"}}}}}},

@@ -29,6 +29,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"not_terminal", 409},
     {"no_artifacts", 409},
     {"length_required", 411},
+    {"tus_version", 412},
     {"too_large", 413},
     {"uri_too_long", 414},
     {"unsupported_media_type", 415},
@@ -41,6 +42,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"quota", 429},
     {"rate_limited", 429},
     {"header_too_large", 431},
+    {"checksum_mismatch", 460},  // as tus has it
     {"internal", 500},
     {"store_failed", 500},
     {"io_failed", 500},

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/base/base64.h"
 #include "core/base/sha256.h"
 
 namespace kiln {
@@ -31,34 +32,13 @@ bool equal_hashes(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-int base64_value(char c) {
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  return c == '+' ? 62 : c == '/' ? 63 : -1;
-}
-
-std::string base64_decode(std::string_view text) {
-  std::string bytes;
-  unsigned buffer = 0;
-  int bits = 0;
-  for (const char c : text) {
-    const int value = base64_value(c);
-    if (value < 0) break;
-    buffer = (buffer << 6 | static_cast<unsigned>(value)) & 0xffffffU;
-    bits += 6;
-    if (bits < 8) continue;
-    bits -= 8;
-    bytes.push_back(static_cast<char>(buffer >> bits & 0xffU));
-  }
-  return bytes;
-}
-
 /// The token in an Authorization value; empty when there is none.
 std::string token_in(std::string_view value) {
   if (value.starts_with("Bearer ")) return std::string(value.substr(7));
   if (!value.starts_with("Basic ")) return {};
-  const std::string pair = base64_decode(value.substr(6));
+  const auto bytes = base64_decode(value.substr(6));
+  if (!bytes) return {};
+  const std::string pair(bytes->begin(), bytes->end());
   const std::size_t colon = pair.find(':');
   return colon == std::string::npos ? std::string() : pair.substr(colon + 1);
 }

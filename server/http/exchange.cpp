@@ -7,6 +7,7 @@
 #include <cctype>
 #include <chrono>
 
+#include "server/api/upload_fields.h"
 #include "server/http/parse_head.h"
 
 namespace kiln {
@@ -91,6 +92,7 @@ Exchange::Exchange(ExchangeRules rules, Service& service, const Handlers& handle
       library_(handlers, elsewhere, [this](const Endpoint* endpoint, const Handler& handler, Request& request) {
         Reply reply = dispatch(endpoint, handler, request);
         stamp(reply, request.id);
+        if (endpoint != nullptr && endpoint->tag == "uploads") reply.fields.push_back({"tus-resumable", kTusVersion});
         return reply;
       }) {}
 

@@ -37,7 +37,7 @@ void raise_descriptor_limit() {
 Handlers all_routes(RouteContext& context) {
   Handlers all;
   for (Handlers part : {job_routes(context), event_routes(context), artifact_routes(context), asset_routes(context),
-                        recipe_routes(context), service_routes(context), viewer_routes()})
+                        upload_routes(context), recipe_routes(context), service_routes(context), viewer_routes()})
     all.merge(part);
   return all;
 }
@@ -71,7 +71,13 @@ struct HttpServer::State {
         uploads(options.max_uploads),
         streams(options.max_streams),
         downloads(options.max_downloads),
-        context{s, streams, downloads, draining, options.heartbeat, [this] { return metrics_text(); }},
+        context{s,
+                streams,
+                downloads,
+                draining,
+                options.heartbeat,
+                [this] { return metrics_text(); },
+                options.max_upload_bytes},
         exchange({options.max_upload_bytes, options.hosts, options.tokens}, s, all_routes(context), viewer_file,
                  uploads, metrics, options.log),
         front(

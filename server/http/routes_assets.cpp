@@ -71,7 +71,8 @@ Reply with_offset(Reply reply, Service& service, const std::string& sha256) {
 Reply store_piece(Service& service, Request& request, const std::string& sha256, const Piece& piece) {
   auto upload = service.put_asset({sha256, piece.offset, request.body->length()});
   if (!upload) return with_offset(fault_reply(upload.error()), service, sha256);
-  auto copied = copy_to_upload(**upload, [&](std::span<std::uint8_t> out) { return request.body->read(out); });
+  auto copied = copy_bytes([&](std::span<std::uint8_t> out) { return request.body->read(out); },
+                           [&](std::span<const std::uint8_t> bytes) { return (*upload)->write(bytes); });
   if (!copied) return problem_reply(copied.error());
   if (!piece.last) {
     const std::uint64_t bytes = (*upload)->bytes();

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "server/blobs/partial_upload.h"
+
 namespace kiln {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr Millis kReapEvery{5000};
-constexpr double kPartialAgeS = 24 * 3600;
 
 /// Blobs whose row never came to be. Their age is the blob's own.
 Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
@@ -80,7 +81,7 @@ void Housekeeping::tidy(bool collect) {
   }
   if (!collect) return;
   static_cast<void>(collect_unused_blobs(place_, grace_));  // a store that cannot write now: the next round
-  place_.blobs.expire_partials(kPartialAgeS);
+  place_.blobs.expire_partials(static_cast<double>(PartialUploads::kKept.count()));
   place_.blobs.remove_dead_writers();
 }
 

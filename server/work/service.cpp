@@ -98,6 +98,15 @@ class LocalService final : public Service {
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
 
+  Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
+  Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) override {
+    return desk_.find(id, tenant);
+  }
+  Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& upload, std::uint64_t offset) override;
+  Result<void> remove_upload(const std::string& id, const std::string& tenant) override {
+    return desk_.remove(id, tenant);
+  }
+
   ServiceStats stats() override;
   std::vector<Check> checks() override;
 
@@ -106,6 +115,8 @@ class LocalService final : public Service {
   template <class Condition>
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
+  Result<void> check_room(std::uint64_t bytes) const;
+  Result<StoredBlob> register_blob(const std::string& tenant, const std::function<Result<StoredBlob>()>& store);
   bool may_claim() const { return disk().free_fraction >= options_.hard_free_fraction; }
   DiskSpace disk() const;
   WorkPlace place() { return {*store_, *blobs_, bus_, counters_, work_options_}; }
@@ -123,6 +134,7 @@ class LocalService final : public Service {
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), options_.blob_grace};
   Neighbours neighbours_{place(), supervisor_};
+  UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};
 };
 
 class LocalUpload final : public AssetUpload {
@@ -133,12 +145,7 @@ class LocalUpload final : public AssetUpload {
   Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
   std::uint64_t bytes() const override { return writer_.bytes(); }
   Result<StoredBlob> finish() override {
-    KILN_TRY(gate, service_->store_->enter_blob_gate());
-    KILN_TRY(stored, writer_.finish());
-    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes, tenant_);
-    if (!noted) return tl::make_unexpected(noted.error());
-    service_->counters_.bytes_uploaded += stored.bytes;
-    return stored;
+    return service_->register_blob(tenant_, [this] { return writer_.finish(); });
   }
 
  private:
@@ -261,12 +268,43 @@ Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const st
   return OpenArtifact{*found, std::move(reader)};
 }
 
+Result<void> LocalService::check_room(std::uint64_t bytes) const {
+  const DiskSpace room = disk();
+  if (room.free_fraction >= options_.soft_free_fraction && room.free_bytes >= bytes) return {};
+  return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
+}
+
+/// Under the gate from the first name of the blob to its row.
+Result<StoredBlob> LocalService::register_blob(const std::string& tenant,
+                                               const std::function<Result<StoredBlob>()>& store) {
+  KILN_TRY(gate, store_->enter_blob_gate());
+  KILN_TRY(stored, store());
+  if (auto noted = store_->touch_blob(stored.sha256, stored.bytes, tenant); !noted) {
+    return tl::make_unexpected(noted.error());
+  }
+  counters_.bytes_uploaded += stored.bytes;
+  return stored;
+}
+
+Result<PartialUpload> LocalService::begin_upload(const PartialUpload& wanted) {
+  if (bus_.closed()) return draining();
+  if (auto room = check_room(wanted.length); !room) return tl::make_unexpected(room.error());
+  KILN_TRY(upload, desk_.begin(wanted));
+  if (!upload.done || has_asset(upload.sha256, upload.tenant)) return upload;
+  // It was complete, and its blob was collected meanwhile.
+  if (auto gone = desk_.remove(upload.id, upload.tenant); !gone) return tl::make_unexpected(gone.error());
+  return desk_.begin(wanted);
+}
+
+Result<std::unique_ptr<UploadPiece>> LocalService::append_upload(const PartialUpload& upload, std::uint64_t offset) {
+  if (bus_.closed()) return draining();
+  if (auto room = check_room(0); !room) return tl::make_unexpected(room.error());
+  return desk_.append(upload, offset);
+}
+
 Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
   if (bus_.closed()) return draining();
-  const DiskSpace room = disk();
-  if (room.free_fraction < options_.soft_free_fraction || room.free_bytes < request.expected) {
-    return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
-  }
+  if (auto room = check_room(request.expected); !room) return tl::make_unexpected(room.error());
   KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
   return std::make_unique<LocalUpload>(*this, std::move(writer), request.tenant);
 }

@@ -21,6 +21,7 @@
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
 #include "server/work/stores.h"
+#include "server/work/upload_desk.h"
 
 namespace kiln {
 
@@ -139,6 +140,13 @@ class Service {
   /// Where an interrupted upload of `sha256` goes on.
   virtual std::uint64_t asset_offset(const std::string& sha256) = 0;
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;
+
+  /// Uploads in pieces; see UploadDesk. `wanted` has length, metadata, and expected if it is known.
+  virtual Result<PartialUpload> begin_upload(const PartialUpload& wanted) = 0;
+  virtual Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) = 0;
+  virtual Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& id_and_tenant,
+                                                             std::uint64_t offset) = 0;
+  virtual Result<void> remove_upload(const std::string& id, const std::string& tenant) = 0;
 
   virtual ServiceStats stats() = 0;
   /// Whether the service can take work, thing by thing.

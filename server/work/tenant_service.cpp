@@ -101,6 +101,18 @@ Result<std::unique_ptr<AssetUpload>> TenantService::put_asset(const AssetRequest
   return all_.put_asset(own);
 }
 
+Result<PartialUpload> TenantService::begin_upload(const PartialUpload& wanted) {
+  PartialUpload own = wanted;
+  own.tenant = tenant_;
+  return all_.begin_upload(own);
+}
+
+Result<std::unique_ptr<UploadPiece>> TenantService::append_upload(const PartialUpload& upload, std::uint64_t offset) {
+  PartialUpload own = upload;
+  own.tenant = tenant_;
+  return all_.append_upload(own, offset);
+}
+
 bool TenantService::has_asset(const std::string& sha256, const std::optional<std::string>&) {
   return all_.has_asset(sha256, tenant_);
 }

@@ -32,6 +32,14 @@ class TenantService final : public Service {
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
   std::uint64_t asset_offset(const std::string& sha256) override { return all_.asset_offset(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override;
+  Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
+  Result<PartialUpload> find_upload(const std::string& id, const std::string&) override {
+    return all_.find_upload(id, tenant_);
+  }
+  Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& upload, std::uint64_t offset) override;
+  Result<void> remove_upload(const std::string& id, const std::string&) override {
+    return all_.remove_upload(id, tenant_);
+  }
 
  private:
   Submission of_this_tenant(Submission) const;

@@ -66,8 +66,16 @@ FakeService::FakeService() {
 }
 
 BlobStore& FakeService::blobs() {
-  std::call_once(blobs_once_, [this] { blobs_ = open_store(folder_); });
+  std::call_once(blobs_once_, [this] {
+    blobs_ = open_store(folder_);
+    desk_ = std::make_unique<UploadDesk>(*blobs_, [](const std::string&, const auto& store) { return store(); });
+  });
   return *blobs_;
+}
+
+UploadDesk& FakeService::desk() {
+  static_cast<void>(blobs());
+  return *desk_;
 }
 
 FakeService::~FakeService() {

@@ -44,6 +44,16 @@ class FakeService : public Service {
   }
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
+  Result<PartialUpload> begin_upload(const PartialUpload& wanted) override { return desk().begin(wanted); }
+  Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) override {
+    return desk().find(id, tenant);
+  }
+  Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& upload, std::uint64_t offset) override {
+    return desk().append(upload, offset);
+  }
+  Result<void> remove_upload(const std::string& id, const std::string& tenant) override {
+    return desk().remove(id, tenant);
+  }
   ServiceStats stats() override { return {}; }
   std::vector<Check> checks() override;
 
@@ -51,11 +61,13 @@ class FakeService : public Service {
   friend class FakeStream;
   /// Made when first asked for: a store of blobs syncs hundreds of folders.
   BlobStore& blobs();
+  UploadDesk& desk();
   void record(Job& job, EventKind kind, const std::string& message = {});
 
   std::filesystem::path folder_;
   std::once_flag blobs_once_;
   std::unique_ptr<BlobStore> blobs_;
+  std::unique_ptr<UploadDesk> desk_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::string, Job> jobs_;
