@@ -52,14 +52,15 @@ class TextSink : public Sink {
   std::string text;
 };
 
-/// Puts the request id into a problem that a handler made without knowing it.
-void stamp(Reply& reply, const std::string& id) {
+/// Puts the request id into a problem that a handler made without knowing it, and notes its code.
+void stamp(Reply& reply, Request& request) {
   const bool is_problem = std::any_of(reply.fields.begin(), reply.fields.end(), [](const Field& field) {
     return field.name == "content-type" && field.value == kProblemType;
   });
   if (!is_problem) return;
   if (auto problem = parse_problem(reply.body)) {
-    problem->request_id = id;
+    problem->request_id = request.id;
+    request.refusal = problem->code;
     reply.body = problem_json(*problem);
   }
 }
@@ -91,7 +92,7 @@ Exchange::Exchange(ExchangeRules rules, Service& service, const Handlers& handle
       log_(std::move(log)),
       library_(handlers, elsewhere, [this](const Endpoint* endpoint, const Handler& handler, Request& request) {
         Reply reply = dispatch(endpoint, handler, request);
-        stamp(reply, request.id);
+        stamp(reply, request);
         if (endpoint != nullptr && endpoint->tag == "uploads") reply.fields.push_back({"tus-resumable", kTusVersion});
         return reply;
       }) {}
@@ -168,7 +169,10 @@ bool Exchange::serve(Connection& connection, std::string_view head_text, const s
                       field_of(request.head, "expect") == "100-continue");
   request.body = &body;
 
-  if (!head) head.error().request_id = request.id;
+  if (!head) {
+    head.error().request_id = request.id;
+    request.refusal = head.error().code;
+  }
   const Outcome outcome = head ? library_.serve(request) : library_.refuse(head.error(), connection);
 
   AccessEntry entry;
@@ -181,7 +185,7 @@ bool Exchange::serve(Connection& connection, std::string_view head_text, const s
   entry.status = outcome.status;
   entry.bytes = connection.bytes_written();
   entry.seconds = seconds_since(begin);
-  metrics_.request(entry.operation, entry.status, entry.seconds);
+  metrics_.request(entry.operation, entry.status, entry.seconds, request.refusal);
   if (log_) log_(access_line(entry));
   // After a refusal bytes may still be on their way, announced or not.
   return outcome.status > 0 && outcome.status < 400 && body.drained();

@@ -89,14 +89,13 @@ struct HttpServer::State {
 
   std::string metrics_text() {
     MetricsInput in;
-    in.served = metrics.snapshot();
     in.front = front.stats();
     in.service = service.stats();
     in.uploads = uploads.inside();
     in.streams = streams.inside();
     in.downloads = downloads.inside();
     in.now_ms = now_ms();
-    return prometheus_text(in);
+    return metrics.text(in);
   }
 };
 

@@ -81,6 +81,7 @@ struct Request {
   Pass upload;                 // the place among the uploads; a handler that has read the body may leave it
   std::string id;              // X-Request-Id
   std::string peer;            // address
+  std::string refusal;         // code of the problem that was the answer; empty: none
   Service* service = nullptr;  // what of the service the one who asks may see
 };
 

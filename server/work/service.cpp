@@ -64,8 +64,13 @@ std::string request_hash(const NewJob& job) {
 /// The parts, in the order of their lives: each may use those above it.
 class LocalService final : public Service {
  public:
-  LocalService(ServiceOptions options, DataLock lock, std::unique_ptr<JobStore> store, std::unique_ptr<BlobStore> blobs)
-      : options_(std::move(options)), lock_(std::move(lock)), store_(std::move(store)), blobs_(std::move(blobs)) {}
+  LocalService(ServiceOptions options, DataLock lock, std::unique_ptr<TimedFiles> files,
+               std::unique_ptr<JobStore> store, std::unique_ptr<BlobStore> blobs)
+      : options_(std::move(options)),
+        lock_(std::move(lock)),
+        files_(std::move(files)),
+        store_(std::move(store)),
+        blobs_(std::move(blobs)) {}
   ~LocalService() override { drain(); }
 
   void start() override {
@@ -124,6 +129,7 @@ class LocalService final : public Service {
 
   const ServiceOptions options_;
   DataLock lock_;
+  std::unique_ptr<TimedFiles> files_;
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;
   EventBus bus_;
@@ -334,7 +340,9 @@ ServiceStats LocalService::stats() {
   stats.deaths_memory = counters_.deaths_memory;
   stats.deaths_timeout = counters_.deaths_timeout;
   stats.bytes_uploaded = counters_.bytes_uploaded;
-  stats.claim_latency_s_sum = static_cast<double>(counters_.claim_latency_ms) / 1000;
+  stats.claim_latency = counters_.claim_latency.snapshot();
+  stats.syncs = files_->syncs().snapshot();
+  stats.sandbox = sandbox_support();
   const DiskSpace room = disk();
   stats.free_fraction = room.free_fraction;
   stats.free_bytes = room.free_bytes;
@@ -376,7 +384,8 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   if (auto sound = check_addresses(options.stores); !sound) return tl::make_unexpected(sound.error());
   KILN_TRY(lock, DataLock::take(options.data));
   KILN_TRY(store, open_job_store(options.stores, options.data));
-  KILN_TRY(blobs, open_blob_store(options.stores, options.data));
+  auto files = std::make_unique<TimedFiles>();
+  KILN_TRY(blobs, open_blob_store(options.stores, options.data, *files));
   if (auto ours = check_owner(options.stores, *store, *blobs); !ours) return tl::make_unexpected(ours.error());
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
@@ -390,7 +399,8 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
     static_cast<void>(requeued);
   }
   remove_stale_checkpoints(options.data / "checkpoints", *store);
-  return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
+  return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(files), std::move(store),
+                                        std::move(blobs));
 }
 
 }  // namespace kiln

@@ -18,8 +18,10 @@
 #include <vector>
 
 #include "core/bake/recipe.h"
+#include "core/base/durations.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/work/sandbox.h"
 #include "server/work/stores.h"
 #include "server/work/upload_desk.h"
 
@@ -90,7 +92,9 @@ struct ServiceStats {
   std::uint64_t retried = 0, reaped = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;
-  double claim_latency_s_sum = 0;  // created to claimed, over `claimed`
+  DurationCounts claim_latency;  // created to claimed
+  DurationCounts syncs;          // of blobs and their folders
+  Sandbox sandbox;               // what this kernel offers to lock workers in
   double free_fraction = 1;
   std::uint64_t free_bytes = 0;
 };
