@@ -89,6 +89,16 @@ void add_jobs(std::vector<Endpoint>& all) {
        {{"text/event-stream", "EventText"}},
        {400, 404, 503}});
   all.push_back({"GET",
+                 "/v1/jobs/{id}/history",
+                 "jobHistory",
+                 "jobs",
+                 "Everything that happened to a job, oldest first: each attempt, why it ended, what came of it",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("History"),
+                 {404}});
+  all.push_back({"GET",
                  "/v1/events",
                  "allEvents",
                  "jobs",

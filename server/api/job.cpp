@@ -153,6 +153,18 @@ std::string job_list_json(const JobListReply& list) {
   return dump({{"jobs", std::move(jobs)}, {"next_cursor", or_null(list.next_cursor)}});
 }
 
+std::string history_json(std::string_view job, const std::vector<EventReply>& events) {
+  json list = json::array();
+  for (const EventReply& event : events) {
+    list.push_back({{"id", event.id},
+                    {"at", event.at},
+                    {"kind", event.kind},
+                    {"status", event.status},
+                    {"message", event.message}});
+  }
+  return dump({{"job", job}, {"events", std::move(list)}});
+}
+
 std::string artifact_list_json(std::string_view job, const std::vector<ArtifactReply>& artifacts) {
   return dump({{"artifacts", artifact_array(job, artifacts)}});
 }

@@ -42,6 +42,15 @@ struct JobReply {
   std::vector<ArtifactReply> artifacts;
 };
 
+/// One thing that happened to a job.
+struct EventReply {
+  std::uint64_t id = 0;
+  std::string at;       // RFC 3339 UTC
+  std::string kind;     // state | log | artifact | done
+  std::string status;   // after it
+  std::string message;  // why, or the line, or the artefact's name; may be empty
+};
+
 struct JobListReply {
   std::vector<JobReply> jobs;
   std::string next_cursor;  // empty: no further page
@@ -57,6 +66,8 @@ std::string artifact_url(std::string_view job, std::string_view name);
 std::string job_json(const JobReply&);
 std::string job_list_json(const JobListReply&);
 std::string artifact_list_json(std::string_view job, const std::vector<ArtifactReply>&);
+
+std::string history_json(std::string_view job, const std::vector<EventReply>&);
 
 /// The data of the server-sent events `progress`, `artifact` and `log`: the object plus "job".
 std::string progress_event_json(std::string_view job, const ProgressReply&);

@@ -84,6 +84,12 @@ constexpr const char* kJobSchemas = R"json(
       "artifacts": {"type": "array", "items": {"$ref": "#/components/schemas/Artifact"}},
       "links": {"type": "object", "properties": {"self": {"type": "string"}, "events": {"type": "string"},
         "view": {"type": "string"}, "artifacts": {"type": "string"}, "bundle": {"type": "string"}}}}},
+  "History": {"type": "object", "required": ["job", "events"], "properties": {
+      "job": {"type": "string"},
+      "events": {"type": "array", "items": {"type": "object", "required": ["id", "at", "kind", "status", "message"],
+        "properties": {"id": {"type": "integer"}, "at": {"type": "string", "format": "date-time"},
+          "kind": {"enum": ["state", "log", "artifact", "done"]}, "status": {"$ref": "#/components/schemas/Status"},
+          "message": {"type": "string"}}}}}},
   "JobList": {"type": "object", "required": ["jobs", "next_cursor"], "properties": {
       "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}}, "next_cursor": {"type": ["string", "null"]}}},
 )json";

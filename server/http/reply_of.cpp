@@ -30,6 +30,11 @@ JobReply job_reply(const Job& job) {
   return reply;
 }
 
+EventReply event_reply(const JobEvent& event) {
+  return {event.id, rfc3339(event.at_ms), std::string(to_string(event.kind)), std::string(to_string(event.state)),
+          event.message};
+}
+
 Reply fault_reply(const Fault& fault) { return problem_reply(problem_of(fault)); }
 
 }  // namespace kiln

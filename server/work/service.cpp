@@ -97,6 +97,8 @@ class LocalService final : public Service {
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
 
+  Result<std::vector<JobEvent>> history(const std::string& id) override;
+
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
@@ -264,6 +266,11 @@ Result<std::unique_ptr<EventStream>> LocalService::subscribe(const std::string& 
   }
   KILN_TRY(last, store_->last_event_id());
   return std::make_unique<StoredEventStream>(*store_, bus_, job_id, after.value_or(last));
+}
+
+Result<std::vector<JobEvent>> LocalService::history(const std::string& id) {
+  KILN_TRY(job, store_->get(id));
+  return store_->events_after(0, job.id, kMaxHistory);
 }
 
 Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const std::string& name) {

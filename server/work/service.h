@@ -137,6 +137,10 @@ class Service {
   virtual Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                          std::optional<std::uint64_t> after) = 0;
 
+  /// What happened to a job, oldest first; of a long story the first kMaxHistory events.
+  static constexpr int kMaxHistory = 1000;
+  virtual Result<std::vector<JobEvent>> history(const std::string& id) = 0;
+
   virtual Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) = 0;
   virtual Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) = 0;
   /// Whether the tenant has it; without one: whether anybody has.

@@ -90,6 +90,11 @@ Result<std::unique_ptr<EventStream>> TenantService::subscribe(const std::string&
   return std::make_unique<TenantStream>(std::move(all), all_, tenant_);
 }
 
+Result<std::vector<JobEvent>> TenantService::history(const std::string& id) {
+  KILN_TRY(job, get(id));
+  return all_.history(job.id);
+}
+
 Result<OpenArtifact> TenantService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, get(id));
   return all_.open_artifact(job.id, name);

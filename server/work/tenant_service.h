@@ -27,6 +27,7 @@ class TenantService final : public Service {
   Result<Job> wait_done(const std::string& id, Millis timeout) override;
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
+  Result<std::vector<JobEvent>> history(const std::string& id) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;

@@ -224,6 +224,15 @@ Result<std::unique_ptr<EventStream>> FakeService::subscribe(const std::string& j
   return std::unique_ptr<EventStream>(std::make_unique<FakeStream>(*this, job_id, after.value_or(events_.size())));
 }
 
+Result<std::vector<JobEvent>> FakeService::history(const std::string& id) {
+  KILN_TRY(job, get(id));
+  const std::lock_guard lock(mutex_);
+  std::vector<JobEvent> own;
+  for (const JobEvent& event : events_)
+    if (event.job_id == job.id) own.push_back(event);
+  return own;
+}
+
 Result<OpenArtifact> FakeService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, get(id));
   for (const Artifact& artifact : job.artifacts) {

@@ -191,6 +191,24 @@ TEST(Jobs, CancelAndDeleteActOnceAndAreHarmlessAgain) {
   EXPECT_EQ(server.get("/v1/jobs/" + id).status, 404);
 }
 
+TEST(Jobs, TheHistoryTellsWhatHappenedInOrder) {
+  RunningServer server;
+  const std::string id = server.make_job();
+  server.service().say(id, EventKind::log, "a line");
+  server.service().succeed(id, {{"scene.glb", "x"}});
+  const json history = json::parse(server.get("/v1/jobs/" + id + "/history").body);
+  EXPECT_EQ(history["job"], id);
+  std::vector<std::string> kinds;
+  for (const json& event : history["events"]) kinds.push_back(event["kind"]);
+  ASSERT_GE(kinds.size(), 3U);
+  EXPECT_EQ(kinds[0], "state");
+  EXPECT_EQ(kinds[1], "log");
+  EXPECT_EQ(history["events"][1]["message"], "a line");
+  EXPECT_EQ(kinds.back(), "done");
+  EXPECT_EQ(history["events"].back()["status"], "succeeded");
+  EXPECT_EQ(server.get("/v1/jobs/none/history").status, 404);
+}
+
 TEST(Jobs, AFailedJobCarriesItsProblem) {
   RunningServer server;
   const std::string id = server.make_job();
@@ -376,7 +394,16 @@ TEST(Health, IsAliveWhileReadinessTellsEveryReason) {
 TEST(Metrics, AreReadablePrometheusText) {
   RunningServer server;
   server.get("/healthz");
+  server.get("/v1/jobs/none");
   RawReply reply = server.get("/metrics");
+  EXPECT_EQ(reply.fields["content-type"], "text/plain; version=0.0.4; charset=utf-8");
+  for (const char* sample : {"kiln_http_problems_total{code=\"not_found\"} 1\n", "kiln_sandbox{lock=\"files\"} ",
+                             "kiln_http_request_seconds_bucket{operation=\"health\",le=\"+Inf\"} 1\n",
+                             "# TYPE kiln_claim_latency_seconds histogram\n", "kiln_fsync_seconds_count ",
+                             "kiln_listen_drops_total ", "kiln_oldest_queued_seconds ", "kiln_attempts_total ",
+                             "kiln_stale_commits_total ", "kiln_worker_deaths_total{cause=\"memory\"} "}) {
+    EXPECT_NE(reply.body.find(sample), std::string::npos) << sample;
+  }
   EXPECT_NE(reply.body.find("kiln_http_requests_total{operation=\"health\",status=\"200\"} 1\n"), std::string::npos);
   EXPECT_NE(reply.body.find("# TYPE kiln_jobs gauge\n"), std::string::npos);
   for (std::size_t at = 0; at < reply.body.size();) {  // every line is a comment or "name{labels} number"
