@@ -61,11 +61,31 @@ void add_jobs(std::vector<Endpoint>& all) {
                  "/v1/jobs/{id}",
                  "deleteJob",
                  "jobs",
-                 "Cancel if necessary, then forget the job and its files",
+                 "Cancel if necessary, then forget the job and its files; not a pinned one",
                  {"id"},
                  {},
                  204,
                  {},
+                 {404, 409}});
+  all.push_back({"PUT",
+                 "/v1/jobs/{id}/pin",
+                 "pinJob",
+                 "jobs",
+                 "Keep the job, its inputs and artefacts until it is unpinned, however old it grows",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("Job"),
+                 {404}});
+  all.push_back({"DELETE",
+                 "/v1/jobs/{id}/pin",
+                 "unpinJob",
+                 "jobs",
+                 "Let the job go when its time is over",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("Job"),
                  {404}});
   all.push_back({"POST",
                  "/v1/jobs/{id}/cancel",
@@ -175,6 +195,29 @@ void add_assets(std::vector<Endpoint>& all) {
                  201,
                  as_json("Asset"),
                  {400, 411, 413, 415, 503, 507}});
+}
+
+void add_asset_pins(std::vector<Endpoint>& all) {
+  all.push_back({"PUT",
+                 "/v1/assets/{sha256}/pin",
+                 "pinAsset",
+                 "assets",
+                 "Keep a file, be it an upload or an artefact, whether a job needs it or not",
+                 {"sha256"},
+                 {},
+                 204,
+                 {},
+                 {404, 422}});
+  all.push_back({"DELETE",
+                 "/v1/assets/{sha256}/pin",
+                 "unpinAsset",
+                 "assets",
+                 "Let a file go when no job needs it",
+                 {"sha256"},
+                 {},
+                 204,
+                 {},
+                 {404, 422}});
 }
 
 void add_uploads(std::vector<Endpoint>& all) {
@@ -287,6 +330,7 @@ std::vector<Endpoint> make_endpoints() {
   add_jobs(all);
   add_artifacts(all);
   add_assets(all);
+  add_asset_pins(all);
   add_uploads(all);
   add_recipes(all);
   add_service(all);

@@ -36,6 +36,7 @@ struct JobReply {
   std::string created_at, started_at, finished_at;  // RFC 3339 UTC; empty: not yet (null on the wire)
   int attempt = 0;
   bool cached = false;
+  bool pinned = false;        // kept until it is unpinned
   std::string recipe = "{}";  // canonical JSON
   std::optional<ProgressReply> progress;
   std::optional<Problem> error;

@@ -71,14 +71,15 @@ constexpr const char* kJobSchemas = R"json(
   "ArtifactList": {"type": "object", "required": ["artifacts"], "properties": {
       "artifacts": {"type": "array", "items": {"$ref": "#/components/schemas/Artifact"}}}},
   "Job": {"type": "object",
-    "required": ["id", "label", "status", "created_at", "started_at", "finished_at", "attempt", "cached", "recipe",
+    "required": ["id", "label", "status", "created_at", "started_at", "finished_at", "attempt", "cached", "pinned", "recipe",
                  "progress", "error", "artifacts", "links"],
     "properties": {
       "id": {"type": "string"}, "label": {"type": "string"}, "status": {"$ref": "#/components/schemas/Status"},
       "created_at": {"type": ["string", "null"], "format": "date-time"},
       "started_at": {"type": ["string", "null"], "format": "date-time"},
       "finished_at": {"type": ["string", "null"], "format": "date-time"},
-      "attempt": {"type": "integer"}, "cached": {"type": "boolean"}, "recipe": {"type": "object"},
+      "attempt": {"type": "integer"}, "cached": {"type": "boolean"}, "pinned": {"type": "boolean"},
+      "recipe": {"type": "object"},
       "progress": {"oneOf": [{"$ref": "#/components/schemas/Progress"}, {"type": "null"}]},
       "error": {"oneOf": [{"$ref": "#/components/schemas/Problem"}, {"type": "null"}]},
       "artifacts": {"type": "array", "items": {"$ref": "#/components/schemas/Artifact"}},

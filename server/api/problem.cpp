@@ -27,6 +27,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"upload_busy", 409},
     {"offset_mismatch", 409},
     {"not_terminal", 409},
+    {"pinned", 409},
     {"no_artifacts", 409},
     {"length_required", 411},
     {"tus_version", 412},
@@ -40,6 +41,7 @@ constexpr std::pair<std::string_view, int> kStatusOfCode[] = {
     {"queue_full", 429},
     {"plan_busy", 429},
     {"quota", 429},
+    {"daily_quota", 429},
     {"rate_limited", 429},
     {"header_too_large", 431},
     {"checksum_mismatch", 460},  // as tus has it

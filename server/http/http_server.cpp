@@ -22,6 +22,7 @@ FrontOptions front_options(const HttpOptions& options) {
   FrontOptions front = options.front;
   front.address = options.address;
   front.port = options.port;
+  front.proxies = options.proxies;
   front.threads = options.max_uploads + options.max_streams + options.max_downloads + options.quick_threads;
   return front;
 }
@@ -78,8 +79,8 @@ struct HttpServer::State {
                 options.heartbeat,
                 [this] { return metrics_text(); },
                 options.max_upload_bytes},
-        exchange({options.max_upload_bytes, options.hosts, options.tokens}, s, all_routes(context), viewer_file,
-                 uploads, metrics, options.log),
+        exchange({options.max_upload_bytes, options.hosts, options.origins, options.proxies, options.tokens}, s,
+                 all_routes(context), viewer_file, uploads, metrics, options.log),
         front(
             front_options(options),
             [this](Connection& connection, std::string_view head, const std::string& peer) {

@@ -45,6 +45,7 @@ class BodySource {
  public:
   virtual ~BodySource() = default;
   virtual std::uint64_t length() const = 0;
+  virtual std::uint64_t taken() const = 0;  // bytes read so far
   /// Fills a part of `out`; 0 at the end. Problems: incomplete_body (400), timeout (408).
   virtual Answer<std::size_t> read(std::span<std::uint8_t> out) = 0;
 };

@@ -88,6 +88,7 @@ void add_jobs(Families& to, const MetricsInput& in) {
   to.histogram("claim_latency_seconds", "From creation to claim.", s.claim_latency);
   to.counter("retries_total", "Attempts that will be repeated.", s.retried);
   to.counter("reaped_total", "Leases that ended without a word.", s.reaped);
+  to.counter("forgotten_total", "Jobs whose time was over by the retention in force.", s.forgotten);
   to.counter("lost_leases_total", "Jobs given up here because their lease was lost or unanswered.", s.lost_leases);
   to.counter("stale_commits_total", "Results refused because their claim was lost.", s.stale_commits);
 }

@@ -20,6 +20,7 @@ JobReply job_reply(const Job& job) {
   reply.finished_at = rfc3339(job.finished_ms);
   reply.attempt = job.attempt;
   reply.cached = job.cached;
+  reply.pinned = job.pinned;
   reply.recipe = job.recipe;
   if (job.progress) reply.progress = progress_reply(*job.progress);
   if (job.error) {

@@ -113,10 +113,22 @@ Reply get_asset(RouteContext& context, Request& request) {
   return serve_blob(request.head, std::move(*reader), {"application/octet-stream", sha256, sha256, std::move(pass)});
 }
 
+Reply pin_asset(Request& request) {
+  const std::string& sha256 = path_param(request, "sha256");
+  if (!is_sha256(sha256)) return problem_reply(bad_name(sha256));
+  const auto pinned = request.service->pin_asset(sha256, "", request.head.method == "PUT");
+  if (!pinned) return fault_reply(pinned.error());
+  Reply reply;
+  reply.status = 204;
+  return reply;
+}
+
 }  // namespace
 
 Handlers asset_routes(RouteContext& context) {
   return {{"putAsset", [&context](Request& request) { return put_asset(context, request); }},
+          {"pinAsset", pin_asset},
+          {"unpinAsset", pin_asset},
           {"postAsset", [&context](Request& request) { return post_asset(context, request); }},
           {"getAsset", [&context](Request& request) { return get_asset(context, request); }}};
 }

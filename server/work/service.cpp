@@ -98,6 +98,20 @@ class LocalService final : public Service {
                                                  std::optional<std::uint64_t> after) override;
 
   Result<std::vector<JobEvent>> history(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override {
+    auto job = store_->pin(id, pinned);
+    bus_.announce();
+    return job;
+  }
+  Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) override {
+    return store_->pin_blob(sha256, tenant, pinned);
+  }
+  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
+    return store_->charge_upload(tenant, bytes, limit);
+  }
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override {
+    return store_->refund_upload(tenant, bytes);
+  }
 
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
@@ -140,7 +154,7 @@ class LocalService final : public Service {
   StopSignal plans_stop_;
   std::atomic<int> plans_{0};
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
-  Housekeeping housekeeping_{place(), options_.blob_grace};
+  Housekeeping housekeeping_{place(), {options_.blob_grace, options_.retention}};
   Neighbours neighbours_{place(), supervisor_};
   UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};
 };
@@ -240,6 +254,8 @@ Result<Job> LocalService::cancel(const std::string& id) {
 }
 
 Result<void> LocalService::remove(const std::string& id) {
+  KILN_TRY(known, store_->get(id));
+  if (known.pinned) return fault("pinned", "the job is pinned: unpin it first");
   KILN_TRY(job, cancel(id));
   if (!is_terminal(job.state)) {
     KILN_TRY(ended, wait_done(id, kRemoveWait));
@@ -341,6 +357,7 @@ ServiceStats LocalService::stats() {
   stats.cached = counters_.cached;
   stats.retried = counters_.retried;
   stats.reaped = counters_.reaped;
+  stats.forgotten = counters_.forgotten;
   stats.lost_leases = counters_.lost_leases;
   stats.stale_commits = counters_.stale_commits;
   stats.deaths_signal = counters_.deaths_signal;

@@ -95,6 +95,11 @@ Result<std::vector<JobEvent>> TenantService::history(const std::string& id) {
   return all_.history(job.id);
 }
 
+Result<Job> TenantService::pin(const std::string& id, bool pinned) {
+  KILN_TRY(job, get(id));
+  return all_.pin(job.id, pinned);
+}
+
 Result<OpenArtifact> TenantService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, get(id));
   return all_.open_artifact(job.id, name);

@@ -28,6 +28,16 @@ class TenantService final : public Service {
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
   Result<std::vector<JobEvent>> history(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override;
+  Result<void> pin_asset(const std::string& sha256, const std::string&, bool pinned) override {
+    return all_.pin_asset(sha256, tenant_, pinned);
+  }
+  Result<void> charge_upload(const std::string&, std::uint64_t bytes, std::uint64_t limit) override {
+    return all_.charge_upload(tenant_, bytes, limit);
+  }
+  Result<void> refund_upload(const std::string&, std::uint64_t bytes) override {
+    return all_.refund_upload(tenant_, bytes);
+  }
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;

@@ -233,6 +233,32 @@ Result<std::vector<JobEvent>> FakeService::history(const std::string& id) {
   return own;
 }
 
+Result<Job> FakeService::pin(const std::string& id, bool pinned) {
+  const std::lock_guard lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end()) return unknown_job();
+  found->second.pinned = pinned;
+  return found->second;
+}
+
+Result<void> FakeService::pin_asset(const std::string& sha256, const std::string&, bool) {
+  if (!blobs().exists(sha256)) return fault("not_found", "there is no such asset");
+  return {};
+}
+
+Result<void> FakeService::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
+  const std::lock_guard lock(mutex_);
+  if (limit > 0 && uploaded_[tenant] + bytes > limit) return fault("daily_quota", "that is enough for today");
+  uploaded_[tenant] += bytes;
+  return {};
+}
+
+Result<void> FakeService::refund_upload(const std::string& tenant, std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  uploaded_[tenant] -= bytes;
+  return {};
+}
+
 Result<OpenArtifact> FakeService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, get(id));
   for (const Artifact& artifact : job.artifacts) {

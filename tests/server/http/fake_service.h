@@ -38,6 +38,10 @@ class FakeService : public Service {
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
   Result<std::vector<JobEvent>> history(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override;
+  Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) override;
+  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>&) override {
@@ -74,6 +78,7 @@ class FakeService : public Service {
   std::map<std::string, Job> jobs_;
   std::map<std::string, std::string> keys_;  // idempotency key -> job
   std::vector<JobEvent> events_;
+  std::map<std::string, std::uint64_t> uploaded_;  // by tenant
   std::vector<Check> checks_;
   std::optional<Fault> submit_fault_;
   std::string list_exception_;

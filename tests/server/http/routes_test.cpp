@@ -191,6 +191,21 @@ TEST(Jobs, CancelAndDeleteActOnceAndAreHarmlessAgain) {
   EXPECT_EQ(server.get("/v1/jobs/" + id).status, 404);
 }
 
+TEST(Jobs, ArePinnedAndUnpinned) {
+  RunningServer server;
+  const std::string id = server.make_job();
+  const auto pinned = [&](const char* method) {
+    RawReply reply = server.raw(request_text(method, "/v1/jobs/" + id + "/pin", {"Content-Length: 0"}));
+    EXPECT_EQ(reply.status, 200) << reply.all;
+    return parse_job(reply.body)->pinned;
+  };
+  EXPECT_FALSE(parse_job(server.get("/v1/jobs/" + id).body)->pinned);
+  EXPECT_TRUE(pinned("PUT"));
+  EXPECT_TRUE(parse_job(server.get("/v1/jobs/" + id).body)->pinned);
+  EXPECT_FALSE(pinned("DELETE"));
+  EXPECT_EQ(server.raw(request_text("PUT", "/v1/jobs/none/pin", {"Content-Length: 0"})).status, 404);
+}
+
 TEST(Jobs, TheHistoryTellsWhatHappenedInOrder) {
   RunningServer server;
   const std::string id = server.make_job();
@@ -269,6 +284,19 @@ TEST(Assets, AnInterruptedUploadGoesOnWhereItEnded) {
   EXPECT_EQ(wrong.fields.at("upload-offset"), "200000");
   EXPECT_EQ(server.raw(request_text("PUT", target, {"Upload-Offset: 200000"}, bytes.substr(offset))).status, 201);
   EXPECT_EQ(server.get(target).body, bytes);
+}
+
+TEST(Assets, ArePinnedAndUnpinned) {
+  RunningServer server;
+  const std::string asset = "/v1/assets/" + sha_of("kept");
+  const auto status = [&](const char* method, const std::string& path) {
+    return server.raw(request_text(method, path + "/pin", {"Content-Length: 0"})).status;
+  };
+  EXPECT_EQ(status("PUT", asset), 404);
+  ASSERT_EQ(server.raw(request_text("PUT", asset, {}, "kept")).status, 201);
+  EXPECT_EQ(status("PUT", asset), 204);
+  EXPECT_EQ(status("DELETE", asset), 204);
+  EXPECT_EQ(status("PUT", "/v1/assets/short"), 422);
 }
 
 TEST(Assets, MayComeInPiecesNamedByContentRange) {
