@@ -49,9 +49,11 @@ std::thread drain_on_signal(HttpServer& server, Service& service) {
   });
 }
 
-/// The options of the service, with what the token file says of retention.
+/// The options of the service, with what the token file says of retention. A worker of a fleet knows no tokens, and
+/// leaves old jobs to those who do.
 Result<ServiceOptions> with_retention(const DaemonOptions& options) {
   ServiceOptions service = options.service;
+  if (options.worker_only) service.retention = {};
   if (options.token_file.empty()) return service;
   KILN_TRY(tokens, read_tokens(options.token_file));
   service.retention.tenants = kept_by_tenant(tokens);
