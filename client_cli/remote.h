@@ -24,9 +24,10 @@ struct JobInput {
 /// in pieces. The hash.
 Outcome<std::string> upload_asset(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& name);
 
-/// Sends bytes in pieces of 16 MiB (tus 1.0), over lost connections: those that arrived are not sent again.
+/// Sends bytes in pieces of 16 MiB (tus 1.0), over lost connections: those that arrived are not sent again. False when
+/// this address does not keep uploads: an older server, or a balancer before servers that do not share them.
 /// Fails  unreachable when nothing more arrives for a minute, interrupted
-Outcome<void> upload_in_pieces(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& sha256);
+Outcome<bool> upload_in_pieces(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& sha256);
 
 /// Uploads the scene if it is not known and posts the job to /v1/jobs. A .gltf with files beside it, or an environment
 /// file, goes as one form, so that the files keep their names.

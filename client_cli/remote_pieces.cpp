@@ -12,6 +12,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kPieceBytes = 16u << 20;
 constexpr auto kPatience = std::chrono::seconds(60);  // without a byte more
+constexpr int kTries = 2;                             // a server may forget an upload once
 constexpr double kFirstPauseS = 0.2, kLongestPauseS = 5;
 
 const std::pair<std::string, std::string> kTus{"Tus-Resumable", "1.0.0"};
@@ -38,29 +39,30 @@ Outcome<Place> begin_upload(ServerLink& link, std::size_t bytes, const std::stri
 
 /// Whether an upload may go on after this.
 bool is_passing(const Failure& failure) {
-  return failure.exit == ExitCode::unreachable || failure.exit == ExitCode::not_found ||
-         failure.problem.code == "upload_busy" || failure.problem.code == "offset_mismatch";
+  return failure.exit == ExitCode::unreachable || failure.problem.code == "upload_busy" ||
+         failure.problem.code == "offset_mismatch";
 }
 
-/// Where to go on: the server says, or the upload begins anew when it knows it no more.
-Outcome<Place> find_place(ServerLink& link, const Place& last, std::size_t bytes, const std::string& sha256) {
+/// Where to go on, as the server says; not_found when it knows the upload no more.
+Outcome<Place> find_place(ServerLink& link, const Place& last) {
   KILN_TRY(known, link.head(last.path, {kTus}));
-  if (known.status == 404) return begin_upload(link, bytes, sha256);
+  if (known.status == 404) return fail(ExitCode::not_found, "not_found", "the server forgot an upload");
   return known.status < 400 ? Place{last.path, known.upload_offset} : last;
 }
 
-}  // namespace
+Outcome<HttpReply> send_piece(ServerLink& link, const Place& place, std::span<const std::uint8_t> bytes) {
+  const auto piece = bytes.subspan(place.offset, std::min(kPieceBytes, bytes.size() - place.offset));
+  return link.patch(place.path, {kTus, {"Upload-Offset", std::to_string(place.offset)}},
+                    {"application/offset+octet-stream", {{reinterpret_cast<const char*>(piece.data()), piece.size()}}});
+}
 
-Outcome<void> upload_in_pieces(ServerLink& link, std::span<const std::uint8_t> bytes, const std::string& sha256) {
-  KILN_TRY(place, begin_upload(link, bytes.size(), sha256));
+/// From where an upload stands to its end; not_found when the server knows it no more.
+Outcome<void> send_rest(ServerLink& link, Place place, std::span<const std::uint8_t> bytes) {
   std::uint64_t furthest = place.offset;
   auto moved = Clock::now();
   double pause = kFirstPauseS;
   while (place.offset < bytes.size()) {
-    const auto piece = bytes.subspan(place.offset, std::min(kPieceBytes, bytes.size() - place.offset));
-    const auto sent =
-        link.patch(place.path, {kTus, {"Upload-Offset", std::to_string(place.offset)}},
-                   {"application/offset+octet-stream", {{reinterpret_cast<const char*>(piece.data()), piece.size()}}});
+    const auto sent = send_piece(link, place, bytes);
     if (sent) {
       place.offset = sent->upload_offset;
     } else if (!is_passing(sent.error())) {
@@ -68,7 +70,7 @@ Outcome<void> upload_in_pieces(ServerLink& link, std::span<const std::uint8_t> b
     } else {
       if (!sleep_unless_interrupted(pause, link.session().interrupt)) return interrupted();
       pause = std::min(pause * 2, kLongestPauseS);
-      const auto found = find_place(link, place, bytes.size(), sha256);
+      const auto found = find_place(link, place);
       if (!found && !is_passing(found.error())) return tl::make_unexpected(found.error());
       if (found) place = *found;
       if (found) say("the connection broke; going on at " + human_bytes(static_cast<double>(place.offset)));
@@ -82,6 +84,18 @@ Outcome<void> upload_in_pieces(ServerLink& link, std::span<const std::uint8_t> b
     }
   }
   return {};
+}
+
+}  // namespace
+
+Outcome<bool> upload_in_pieces(ServerLink& link, std::span<const std::uint8_t> bytes, const std::string& sha256) {
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    const auto place = begin_upload(link, bytes.size(), sha256);
+    const Outcome<void> sent = place ? send_rest(link, *place, bytes) : tl::make_unexpected(place.error());
+    if (sent) return true;
+    if (sent.error().exit != ExitCode::not_found) return tl::make_unexpected(sent.error());
+  }
+  return false;
 }
 
 }  // namespace kiln

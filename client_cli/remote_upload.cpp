@@ -98,8 +98,8 @@ Outcome<std::string> upload_asset(ServerLink& link, std::span<const std::uint8_t
     const std::uint64_t start = known.upload_offset < bytes.size() ? known.upload_offset : 0;
     if (bytes.size() > kPutBytes) {
       say("uploading " + name + ", " + human_bytes(static_cast<double>(bytes.size())));
-      const auto sent = upload_in_pieces(link, bytes, hash);
-      return sent ? Outcome<std::string>(hash) : tl::make_unexpected(sent.error());
+      KILN_TRY(sent, upload_in_pieces(link, bytes, hash));
+      if (sent) return hash;
     }
     say((start > 0 ? "going on with " : "uploading ") + name + ", " +
         human_bytes(static_cast<double>(bytes.size() - start)));

@@ -68,6 +68,21 @@ TEST_P(BlobConformance, AnUploadInPiecesHasOneWriterAndOneOffset) {
   EXPECT_EQ(writer.write(bytes_of(kText)).error().code, "too_large");
 }
 
+TEST_P(BlobConformance, AnUploadInPiecesGoesOnThroughAnotherProgramWithTheSameSpool) {
+  PartialUploads uploads(store());
+  const PartialUpload upload = uploads.begin(wanted()).value();
+  ASSERT_TRUE(send(uploads, upload, 0, 5));
+  const auto other_store = open();
+  PartialUploads others(*other_store);
+  EXPECT_EQ(others.find(upload.id, "studio")->offset, 5U);
+  {
+    const auto writer = uploads.append(upload, 5).value();
+    EXPECT_EQ(others.append(upload, 5).error().code, "upload_busy");
+  }
+  const PartialUpload whole = send(others, upload, 5, kText.size()).value();
+  EXPECT_EQ(read(store(), others.store(whole)->sha256), kText);
+}
+
 TEST_P(BlobConformance, APieceThatCountsWholeOrNotAtAllLeavesNothingWhenItIsDropped) {
   PartialUploads uploads(store());
   const PartialUpload upload = uploads.begin(wanted()).value();
