@@ -116,9 +116,13 @@ void add_jobs(Program& program) {
   cancel.parser->add_option("ids", cancel.fields->ids, "jobs")->required()->type_name("ID");
   const auto remove = add_command<RemoveOptions>(program, "rm", "Forget jobs and their artefacts");
   remove.parser->add_option("ids", remove.fields->ids, "jobs")->required()->type_name("ID");
+  const auto pin = add_command<PinOptions>(program, "pin", "Keep jobs or files on the server, however old they grow");
+  pin.parser->add_option("ids", pin.fields->ids, "jobs, or files by their SHA-256")->required()->type_name("ID");
+  pin.parser->add_flag("--off", pin.fields->off, "let them go when their time is over");
   const auto open = add_command<OpenOptions>(program, "open", "Address of a job's viewer; opens it on a desktop");
   open.parser->add_option("id", open.fields->id, "job")->required()->type_name("ID");
-  for (CLI::App* parser : {watch.parser, get.parser, list.parser, cancel.parser, remove.parser, open.parser})
+  for (CLI::App* parser :
+       {watch.parser, get.parser, list.parser, cancel.parser, remove.parser, pin.parser, open.parser})
     add_server(program, parser);
 }
 

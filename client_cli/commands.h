@@ -23,6 +23,7 @@ Outcome<ExitCode> run(const WatchOptions&, Session&);
 Outcome<ExitCode> run(const GetOptions&, Session&);
 Outcome<ExitCode> run(const ListOptions&, Session&);
 Outcome<ExitCode> run(const CancelOptions&, Session&);
+Outcome<ExitCode> run(const PinOptions&, Session&);
 Outcome<ExitCode> run(const RemoveOptions&, Session&);
 Outcome<ExitCode> run(const PlanOptions&, Session&);
 Outcome<ExitCode> run(const InspectOptions&, Session&);

@@ -62,6 +62,12 @@ struct ListOptions {
 struct CancelOptions {
   std::vector<std::string> ids;
 };
+/// A job by its id, or a file by its SHA-256.
+struct PinOptions {
+  std::vector<std::string> ids;
+  bool off = false;
+};
+
 struct RemoveOptions {
   std::vector<std::string> ids;
 };
@@ -111,9 +117,9 @@ struct CompletionOptions {
 };
 
 using CommandOptions =
-    std::variant<BakeOptions, SubmitOptions, WatchOptions, GetOptions, ListOptions, CancelOptions, RemoveOptions,
-                 PlanOptions, InspectOptions, EvalOptions, TruthOptions, CompareOptions, PointsOptions, PresetsOptions,
-                 DemoSceneOptions, OpenOptions, CompletionOptions>;
+    std::variant<BakeOptions, SubmitOptions, WatchOptions, GetOptions, ListOptions, CancelOptions, PinOptions,
+                 RemoveOptions, PlanOptions, InspectOptions, EvalOptions, TruthOptions, CompareOptions, PointsOptions,
+                 PresetsOptions, DemoSceneOptions, OpenOptions, CompletionOptions>;
 
 struct Options {
   CommonOptions common;

@@ -2,6 +2,7 @@
 // What a client asks of a server: upload, submit, watch, download.
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,14 @@ struct JobInput {
   std::string idempotency_key;  // empty: none
 };
 
-/// Uploads bytes under their hash unless the server knows them; goes on where an earlier upload broke. The hash.
+/// Uploads bytes under their hash unless the server knows them; goes on where an earlier upload broke, more than 16 MiB
+/// in pieces. The hash.
 Outcome<std::string> upload_asset(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& name);
+
+/// Sends bytes in pieces of 16 MiB (tus 1.0), over lost connections: those that arrived are not sent again. False when
+/// this address does not keep uploads: an older server, or a balancer before servers that do not share them.
+/// Fails  unreachable when nothing more arrives for a minute, interrupted
+Outcome<bool> upload_in_pieces(ServerLink&, std::span<const std::uint8_t> bytes, const std::string& sha256);
 
 /// Uploads the scene if it is not known and posts the job to /v1/jobs. A .gltf with files beside it, or an environment
 /// file, goes as one form, so that the files keep their names.

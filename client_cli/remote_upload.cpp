@@ -10,7 +10,8 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kBytes = "application/octet-stream";
-constexpr int kUploadTries = 3;  // an upload that broke goes on where it broke
+constexpr std::size_t kPutBytes = 16u << 20;  // more goes in pieces
+constexpr int kUploadTries = 3;               // an upload that broke goes on where it broke
 
 std::string_view view_of(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -95,6 +96,11 @@ Outcome<std::string> upload_asset(ServerLink& link, std::span<const std::uint8_t
     KILN_TRY(known, link.head(path));
     if (known.status == 200) return hash;
     const std::uint64_t start = known.upload_offset < bytes.size() ? known.upload_offset : 0;
+    if (bytes.size() > kPutBytes) {
+      say("uploading " + name + ", " + human_bytes(static_cast<double>(bytes.size())));
+      KILN_TRY(sent, upload_in_pieces(link, bytes, hash));
+      if (sent) return hash;
+    }
     say((start > 0 ? "going on with " : "uploading ") + name + ", " +
         human_bytes(static_cast<double>(bytes.size() - start)));
     const auto sent =

@@ -41,6 +41,12 @@ Failure failure_of_reply(int status, const std::string& body) {
   return failure_of(problem);
 }
 
+HttpReply reply_of(httplib::Response response) {
+  const std::string offset = response.get_header_value("Upload-Offset");
+  return {response.status, std::move(response.body), response.get_header_value("Location"),
+          std::strtoull(offset.c_str(), nullptr, 10)};
+}
+
 httplib::Headers to_headers(const HttpHeaders& headers) { return {headers.begin(), headers.end()}; }
 
 std::size_t size_of(const HttpBody& body) {
@@ -131,7 +137,7 @@ struct ServerLink::Connection {
   Outcome<HttpReply> reply(const std::function<httplib::Result()>& send) {
     KILN_TRY(response, request(send));
     if (response.status >= 400) return tl::make_unexpected(failure_of_reply(response.status, response.body));
-    return HttpReply{response.status, std::move(response.body)};
+    return reply_of(std::move(response));
   }
 };
 
@@ -158,9 +164,10 @@ Outcome<HttpReply> ServerLink::get(const std::string& path) {
   return connection_->reply([&] { return connection_->client.Get(connection_->prefix + path); });
 }
 
-Outcome<HeadReply> ServerLink::head(const std::string& path) {
-  KILN_TRY(response, connection_->request([&] { return connection_->client.Head(connection_->prefix + path); }));
-  return HeadReply{response.status, std::strtoull(response.get_header_value("Upload-Offset").c_str(), nullptr, 10)};
+Outcome<HttpReply> ServerLink::head(const std::string& path, const HttpHeaders& headers) {
+  KILN_TRY(response, connection_->request(
+                         [&] { return connection_->client.Head(connection_->prefix + path, to_headers(headers)); }));
+  return reply_of(std::move(response));
 }
 
 Outcome<HttpReply> ServerLink::remove(const std::string& path) {
@@ -179,6 +186,15 @@ Outcome<HttpReply> ServerLink::post(const std::string& path, const HttpHeaders& 
 Outcome<HttpReply> ServerLink::put(const std::string& path, const HttpHeaders& headers, const HttpBody& body) {
   return connection_->reply([&] {
     return connection_->client.Put(
+        connection_->prefix + path, to_headers(headers), size_of(body),
+        [&](std::size_t offset, std::size_t, httplib::DataSink& sink) { return send_piece(body, offset, sink); },
+        body.media_type);
+  });
+}
+
+Outcome<HttpReply> ServerLink::patch(const std::string& path, const HttpHeaders& headers, const HttpBody& body) {
+  return connection_->reply([&] {
+    return connection_->client.Patch(
         connection_->prefix + path, to_headers(headers), size_of(body),
         [&](std::size_t offset, std::size_t, httplib::DataSink& sink) { return send_piece(body, offset, sink); },
         body.media_type);

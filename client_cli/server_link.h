@@ -20,10 +20,7 @@ using HttpHeaders = std::vector<std::pair<std::string, std::string>>;
 struct HttpReply {
   int status = 0;
   std::string body;
-};
-
-struct HeadReply {
-  int status = 0;
+  std::string location;
   std::uint64_t upload_offset = 0;  // bytes of an unfinished upload that the server has
 };
 
@@ -47,10 +44,11 @@ class ServerLink {
 
   Outcome<HttpReply> get(const std::string& path);
   /// What HEAD tells, whatever its status.
-  Outcome<HeadReply> head(const std::string& path);
+  Outcome<HttpReply> head(const std::string& path, const HttpHeaders& = {});
   Outcome<HttpReply> remove(const std::string& path);
   Outcome<HttpReply> post(const std::string& path, const HttpHeaders&, const HttpBody&);
   Outcome<HttpReply> put(const std::string& path, const HttpHeaders&, const HttpBody&);
+  Outcome<HttpReply> patch(const std::string& path, const HttpHeaders&, const HttpBody&);
   /// A reply that is too long to keep, or never ends. Ends without failure when `sink` ends it.
   Outcome<void> stream(const std::string& path, const HttpHeaders&, const ByteSink& sink);
 

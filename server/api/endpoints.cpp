@@ -61,11 +61,31 @@ void add_jobs(std::vector<Endpoint>& all) {
                  "/v1/jobs/{id}",
                  "deleteJob",
                  "jobs",
-                 "Cancel if necessary, then forget the job and its files",
+                 "Cancel if necessary, then forget the job and its files; not a pinned one",
                  {"id"},
                  {},
                  204,
                  {},
+                 {404, 409}});
+  all.push_back({"PUT",
+                 "/v1/jobs/{id}/pin",
+                 "pinJob",
+                 "jobs",
+                 "Keep the job, its inputs and artefacts until it is unpinned, however old it grows",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("Job"),
+                 {404}});
+  all.push_back({"DELETE",
+                 "/v1/jobs/{id}/pin",
+                 "unpinJob",
+                 "jobs",
+                 "Let the job go when its time is over",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("Job"),
                  {404}});
   all.push_back({"POST",
                  "/v1/jobs/{id}/cancel",
@@ -88,6 +108,16 @@ void add_jobs(std::vector<Endpoint>& all) {
        200,
        {{"text/event-stream", "EventText"}},
        {400, 404, 503}});
+  all.push_back({"GET",
+                 "/v1/jobs/{id}/history",
+                 "jobHistory",
+                 "jobs",
+                 "Everything that happened to a job, oldest first: each attempt, why it ended, what came of it",
+                 {"id"},
+                 {},
+                 200,
+                 as_json("History"),
+                 {404}});
   all.push_back({"GET",
                  "/v1/events",
                  "allEvents",
@@ -167,6 +197,82 @@ void add_assets(std::vector<Endpoint>& all) {
                  {400, 411, 413, 415, 503, 507}});
 }
 
+void add_asset_pins(std::vector<Endpoint>& all) {
+  all.push_back({"PUT",
+                 "/v1/assets/{sha256}/pin",
+                 "pinAsset",
+                 "assets",
+                 "Keep a file, be it an upload or an artefact, whether a job needs it or not",
+                 {"sha256"},
+                 {},
+                 204,
+                 {},
+                 {404, 422}});
+  all.push_back({"DELETE",
+                 "/v1/assets/{sha256}/pin",
+                 "unpinAsset",
+                 "assets",
+                 "Let a file go when no job needs it",
+                 {"sha256"},
+                 {},
+                 204,
+                 {},
+                 {404, 422}});
+}
+
+void add_uploads(std::vector<Endpoint>& all) {
+  all.push_back({"OPTIONS",
+                 "/v1/uploads",
+                 "uploadOptions",
+                 "uploads",
+                 "What of the tus protocol is spoken here",
+                 {},
+                 {},
+                 204,
+                 {},
+                 {}});
+  all.push_back({"POST",
+                 "/v1/uploads",
+                 "beginUpload",
+                 "uploads",
+                 "Begin an upload in pieces (tus 1.0). With the same sha256 in Upload-Metadata: find one again",
+                 {"tusResumable", "uploadLength", "uploadMetadata"},
+                 {},
+                 201,
+                 {},
+                 {400, 412, 413, 422, 429, 503, 507}});
+  all.push_back({"GET",
+                 "/v1/uploads/{upload}",
+                 "getUpload",
+                 "uploads",
+                 "Where an upload stands; HEAD tells the same by Upload-Offset and Upload-Length",
+                 {"upload"},
+                 {},
+                 200,
+                 as_json("Upload"),
+                 {404, 409, 412, 503}});
+  all.push_back({"PATCH",
+                 "/v1/uploads/{upload}",
+                 "appendUpload",
+                 "uploads",
+                 "The next bytes. With the last ones Upload-Asset names the asset that the file has become",
+                 {"upload", "tusResumable", "pieceOffset", "uploadChecksum"},
+                 {{"application/offset+octet-stream", "Binary"}},
+                 204,
+                 {},
+                 {400, 404, 409, 411, 412, 413, 415, 422, 429, 460, 503, 507}});
+  all.push_back({"DELETE",
+                 "/v1/uploads/{upload}",
+                 "deleteUpload",
+                 "uploads",
+                 "Give an upload up; an asset that it has become stays",
+                 {"upload", "tusResumable"},
+                 {},
+                 204,
+                 {},
+                 {404, 409, 412}});
+}
+
 void add_recipes(std::vector<Endpoint>& all) {
   all.push_back({"POST",
                  "/v1/plan",
@@ -224,6 +330,8 @@ std::vector<Endpoint> make_endpoints() {
   add_jobs(all);
   add_artifacts(all);
   add_assets(all);
+  add_asset_pins(all);
+  add_uploads(all);
   add_recipes(all);
   add_service(all);
   add_viewer(all);

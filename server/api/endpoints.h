@@ -13,7 +13,7 @@ struct Endpoint {
   std::string_view method;     // GET also answers HEAD
   std::string_view path;       // "/v1/jobs/{id}"
   std::string_view operation;  // unique; the handler's name
-  std::string_view tag;        // jobs, artifacts, assets, recipes, service, viewer
+  std::string_view tag;        // jobs, artifacts, assets, uploads, recipes, service, viewer
   std::string_view summary;
   std::vector<std::string_view> parameters;                           // names in components/parameters
   std::vector<std::pair<std::string_view, std::string_view>> bodies;  // media type, schema

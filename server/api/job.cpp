@@ -61,6 +61,7 @@ json job_object(const JobReply& job) {
           {"finished_at", or_null(job.finished_at)},
           {"attempt", job.attempt},
           {"cached", job.cached},
+          {"pinned", job.pinned},
           {"recipe", parsed(job.recipe)},
           {"progress", job.progress ? progress_object(*job.progress) : json(nullptr)},
           {"error", job.error ? parsed(problem_json(*job.error)) : json(nullptr)},
@@ -101,6 +102,7 @@ JobReply read_job(const json& object) {
   job.finished_at = text_or_empty(object, "finished_at");
   job.attempt = object.value("attempt", 0);
   job.cached = object.value("cached", false);
+  job.pinned = object.value("pinned", false);
   if (object.contains("recipe")) job.recipe = dump(object["recipe"]);
   if (object.contains("progress") && object["progress"].is_object()) job.progress = read_progress(object["progress"]);
   if (object.contains("error") && object["error"].is_object()) {
@@ -151,6 +153,18 @@ std::string job_list_json(const JobListReply& list) {
   json jobs = json::array();
   for (const JobReply& job : list.jobs) jobs.push_back(job_object(job));
   return dump({{"jobs", std::move(jobs)}, {"next_cursor", or_null(list.next_cursor)}});
+}
+
+std::string history_json(std::string_view job, const std::vector<EventReply>& events) {
+  json list = json::array();
+  for (const EventReply& event : events) {
+    list.push_back({{"id", event.id},
+                    {"at", event.at},
+                    {"kind", event.kind},
+                    {"status", event.status},
+                    {"message", event.message}});
+  }
+  return dump({{"job", job}, {"events", std::move(list)}});
 }
 
 std::string artifact_list_json(std::string_view job, const std::vector<ArtifactReply>& artifacts) {

@@ -36,10 +36,20 @@ struct JobReply {
   std::string created_at, started_at, finished_at;  // RFC 3339 UTC; empty: not yet (null on the wire)
   int attempt = 0;
   bool cached = false;
+  bool pinned = false;        // kept until it is unpinned
   std::string recipe = "{}";  // canonical JSON
   std::optional<ProgressReply> progress;
   std::optional<Problem> error;
   std::vector<ArtifactReply> artifacts;
+};
+
+/// One thing that happened to a job.
+struct EventReply {
+  std::uint64_t id = 0;
+  std::string at;       // RFC 3339 UTC
+  std::string kind;     // state | log | artifact | done
+  std::string status;   // after it
+  std::string message;  // why, or the line, or the artefact's name; may be empty
 };
 
 struct JobListReply {
@@ -57,6 +67,8 @@ std::string artifact_url(std::string_view job, std::string_view name);
 std::string job_json(const JobReply&);
 std::string job_list_json(const JobListReply&);
 std::string artifact_list_json(std::string_view job, const std::vector<ArtifactReply>&);
+
+std::string history_json(std::string_view job, const std::vector<EventReply>&);
 
 /// The data of the server-sent events `progress`, `artifact` and `log`: the object plus "job".
 std::string progress_event_json(std::string_view job, const ProgressReply&);

@@ -33,7 +33,17 @@ constexpr const char* kParameters = R"json({
   "download": {"name": "download", "in": "query", "schema": {"type": "integer", "enum": [1]},
     "description": "Put the job's id into the proposed file name"},
   "uploadOffset": {"name": "Upload-Offset", "in": "header", "schema": {"type": "integer", "minimum": 0},
-    "description": "Resume an interrupted upload here; must be what HEAD of the asset tells"}
+    "description": "Resume an interrupted upload here; must be what HEAD of the asset tells"},
+  "upload": {"name": "upload", "in": "path", "required": true, "schema": {"type": "string"}, "description": "Upload id"},
+  "tusResumable": {"name": "Tus-Resumable", "in": "header", "required": true, "schema": {"const": "1.0.0"}},
+  "uploadLength": {"name": "Upload-Length", "in": "header", "required": true,
+    "schema": {"type": "integer", "minimum": 1}, "description": "Bytes of the whole file"},
+  "uploadMetadata": {"name": "Upload-Metadata", "in": "header", "schema": {"type": "string", "maxLength": 4096},
+    "description": "name base64,name base64; sha256 (64 hex digits) is checked at the end"},
+  "pieceOffset": {"name": "Upload-Offset", "in": "header", "required": true, "schema": {"type": "integer", "minimum": 0},
+    "description": "Where the piece begins: what HEAD tells"},
+  "uploadChecksum": {"name": "Upload-Checksum", "in": "header", "schema": {"type": "string"},
+    "description": "sha256 or sha1 and base64 of the piece, which then counts whole or not at all"}
 })json";
 
 constexpr const char* kJobSchemas = R"json(
@@ -61,19 +71,26 @@ constexpr const char* kJobSchemas = R"json(
   "ArtifactList": {"type": "object", "required": ["artifacts"], "properties": {
       "artifacts": {"type": "array", "items": {"$ref": "#/components/schemas/Artifact"}}}},
   "Job": {"type": "object",
-    "required": ["id", "label", "status", "created_at", "started_at", "finished_at", "attempt", "cached", "recipe",
+    "required": ["id", "label", "status", "created_at", "started_at", "finished_at", "attempt", "cached", "pinned", "recipe",
                  "progress", "error", "artifacts", "links"],
     "properties": {
       "id": {"type": "string"}, "label": {"type": "string"}, "status": {"$ref": "#/components/schemas/Status"},
       "created_at": {"type": ["string", "null"], "format": "date-time"},
       "started_at": {"type": ["string", "null"], "format": "date-time"},
       "finished_at": {"type": ["string", "null"], "format": "date-time"},
-      "attempt": {"type": "integer"}, "cached": {"type": "boolean"}, "recipe": {"type": "object"},
+      "attempt": {"type": "integer"}, "cached": {"type": "boolean"}, "pinned": {"type": "boolean"},
+      "recipe": {"type": "object"},
       "progress": {"oneOf": [{"$ref": "#/components/schemas/Progress"}, {"type": "null"}]},
       "error": {"oneOf": [{"$ref": "#/components/schemas/Problem"}, {"type": "null"}]},
       "artifacts": {"type": "array", "items": {"$ref": "#/components/schemas/Artifact"}},
       "links": {"type": "object", "properties": {"self": {"type": "string"}, "events": {"type": "string"},
         "view": {"type": "string"}, "artifacts": {"type": "string"}, "bundle": {"type": "string"}}}}},
+  "History": {"type": "object", "required": ["job", "events"], "properties": {
+      "job": {"type": "string"},
+      "events": {"type": "array", "items": {"type": "object", "required": ["id", "at", "kind", "status", "message"],
+        "properties": {"id": {"type": "integer"}, "at": {"type": "string", "format": "date-time"},
+          "kind": {"enum": ["state", "log", "artifact", "done"]}, "status": {"$ref": "#/components/schemas/Status"},
+          "message": {"type": "string"}}}}}},
   "JobList": {"type": "object", "required": ["jobs", "next_cursor"], "properties": {
       "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}}, "next_cursor": {"type": ["string", "null"]}}},
 )json";
@@ -81,6 +98,9 @@ constexpr const char* kJobSchemas = R"json(
 constexpr const char* kOtherSchemas = R"json(
   "Asset": {"type": "object", "required": ["sha256", "bytes", "existed"], "properties": {
       "sha256": {"$ref": "#/components/schemas/Sha256"}, "bytes": {"type": "integer"}, "existed": {"type": "boolean"}}},
+  "Upload": {"type": "object", "required": ["id", "length", "offset", "expires_at", "asset"], "properties": {
+      "id": {"type": "string"}, "length": {"type": "integer"}, "offset": {"type": "integer"},
+      "expires_at": {"type": "string", "format": "date-time"}, "asset": {"type": ["string", "null"]}}},
   "PresetList": {"type": "object", "required": ["presets"], "properties": {"presets": {"type": "array", "items": {
       "type": "object", "required": ["name", "description", "recipe"], "properties": {"name": {"type": "string"},
         "description": {"type": "string"}, "recipe": {"type": "object"}}}}}},

@@ -1,6 +1,7 @@
 #include "server/blobs/blob_io.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 
 #include <vector>
@@ -15,6 +16,13 @@ constexpr std::size_t kPiece = 256 * 1024;
 tl::unexpected<Fault> io_fault(int error, const char* doing) {
   if (error == ENOSPC || error == EDQUOT) return fault("disk_full", "the disk of the server is full");
   return fault("io_failed", std::string("the server could not ") + doing + " (errno " + std::to_string(error) + ")");
+}
+
+bool lock_file(int fd, const std::filesystem::path& name) {
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) return false;
+  struct stat opened {
+  }, named{};
+  return ::fstat(fd, &opened) == 0 && ::stat(name.c_str(), &named) == 0 && opened.st_ino == named.st_ino;
 }
 
 Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder) {

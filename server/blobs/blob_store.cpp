@@ -3,8 +3,6 @@
 #include "server/blobs/blob_store.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -21,7 +19,11 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPartial = "part.";  // tmp/part.<sha256>: a named upload that may be resumed
 
-bool is_partial(const fs::path& file) { return file.filename().string().starts_with(kPartial); }
+/// A named upload, or one that comes in pieces (partial_upload.h).
+bool is_partial(const fs::path& file) {
+  const std::string name = file.filename();
+  return name.starts_with(kPartial) || name.starts_with("up.");
+}
 
 /// Unique among the machines that may share the folder.
 std::string random_name() {
@@ -33,14 +35,6 @@ std::string random_name() {
   }();
   const auto now = std::chrono::system_clock::now().time_since_epoch().count();
   return machine + "." + std::to_string(::getpid()) + "." + std::to_string(now) + "." + std::to_string(count++);
-}
-
-/// Locks an open file if nobody else has, and if it still is the one of that name.
-bool lock_file(int fd, const fs::path& name) {
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) return false;
-  struct stat opened {
-  }, named{};
-  return ::fstat(fd, &opened) == 0 && ::stat(name.c_str(), &named) == 0 && opened.st_ino == named.st_ino;
 }
 
 }  // namespace

@@ -62,7 +62,8 @@ class BlobStore {
   std::uint64_t partial_bytes(const std::string& sha256) const;
   /// Removes files of anonymous writers that are gone. Returns how many went.
   int remove_dead_writers();
-  /// Removes named uploads that nobody writes and that are older than `age_s`. Returns how many went.
+  /// Removes named uploads, and files of those in pieces, that nobody writes and that are older than `age_s`. Returns
+  /// how many files went.
   int expire_partials(double age_s);
 
   /// Moves finished files (closed by their writer, on the spool's file system) into the store, in their order. Fails
@@ -94,6 +95,8 @@ class BlobStore {
 
  private:
   friend class BlobWriter;
+  friend class PartialUploads;
+  friend class PieceWriter;
   std::filesystem::path part_of(const std::string& sha256) const;
   int remove_unlocked(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
   std::filesystem::path folder_;

@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <chrono>
 #include <cstdio>
 
 namespace kiln {
@@ -20,6 +22,15 @@ int FileLayer::close(int fd) { return ::close(fd); }
 int FileLayer::rename(const std::string& from, const std::string& to) { return ::rename(from.c_str(), to.c_str()); }
 int FileLayer::unlink(const std::string& path) { return ::unlink(path.c_str()); }
 int FileLayer::mkdir(const std::string& path, unsigned mode) { return ::mkdir(path.c_str(), mode); }
+
+int TimedFiles::fsync(int fd) {
+  const auto begin = std::chrono::steady_clock::now();
+  const int done = FileLayer::fsync(fd);
+  const int error = errno;
+  syncs_.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  errno = error;
+  return done;
+}
 
 FileLayer& real_files() {
   static FileLayer files;  // without state: the system's own calls

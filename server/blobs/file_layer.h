@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <string>
 
+#include "core/base/durations.h"
+
 namespace kiln {
 
 /// Same meaning, return value and errno as the system call of that name.
@@ -21,6 +23,16 @@ class FileLayer {
   virtual int rename(const std::string& from, const std::string& to);
   virtual int unlink(const std::string& path);
   virtual int mkdir(const std::string& path, unsigned mode);
+};
+
+/// The machine's own files, and how long their syncs take.
+class TimedFiles final : public FileLayer {
+ public:
+  int fsync(int fd) override;
+  const Durations& syncs() const { return syncs_; }
+
+ private:
+  Durations syncs_;
 };
 
 /// The machine's own files.

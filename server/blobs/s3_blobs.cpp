@@ -55,8 +55,8 @@ class S3Source final : public BlobReader::Source {
 
 class S3Blobs final : public BlobStore {
  public:
-  S3Blobs(const S3Options& options, const fs::path& spool)
-      : BlobStore(spool, real_files()), client_(std::make_unique<S3Client>(options)) {}
+  S3Blobs(const S3Options& options, const fs::path& spool, FileLayer& files)
+      : BlobStore(spool, files), client_(std::make_unique<S3Client>(options)) {}
 
   Result<std::vector<StoredBlob>> adopt(std::span<const fs::path> results) override {
     std::vector<StoredBlob> blobs;
@@ -178,11 +178,11 @@ Result<void> S3Blobs::for_each(const std::function<void(const BlobEntry&)>& visi
 
 }  // namespace
 
-Result<std::unique_ptr<BlobStore>> open_s3_blobs(const S3Options& options, const fs::path& spool) {
+Result<std::unique_ptr<BlobStore>> open_s3_blobs(const S3Options& options, const fs::path& spool, FileLayer& files) {
   std::error_code error;
   fs::create_directories(spool / "tmp", error);
   if (error) return fault("io_failed", "the spool for uploads cannot be made");
-  auto blobs = std::make_unique<S3Blobs>(options, spool);
+  auto blobs = std::make_unique<S3Blobs>(options, spool, files);
   if (auto ready = blobs->check(); !ready) return tl::make_unexpected(ready.error());
   return blobs;
 }

@@ -21,6 +21,7 @@ struct S3Options {
 };
 
 /// `spool`: a folder of this machine for bytes on their way in. The bucket must be there ("blobs_refused").
-Result<std::unique_ptr<BlobStore>> open_s3_blobs(const S3Options&, const std::filesystem::path& spool);
+Result<std::unique_ptr<BlobStore>> open_s3_blobs(const S3Options&, const std::filesystem::path& spool,
+                                                 FileLayer& files = real_files());
 
 }  // namespace kiln

@@ -6,12 +6,15 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/base/base64.h"
 #include "core/base/sha256.h"
 
 namespace kiln {
 namespace {
 
 constexpr std::size_t kTokenLength = 43;
+constexpr int kMostDays = 36500;
+constexpr std::uint64_t kMostMegabytes = 1'000'000'000;
 
 std::string hash_of(std::string_view text) {
   return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
@@ -31,34 +34,13 @@ bool equal_hashes(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-int base64_value(char c) {
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  return c == '+' ? 62 : c == '/' ? 63 : -1;
-}
-
-std::string base64_decode(std::string_view text) {
-  std::string bytes;
-  unsigned buffer = 0;
-  int bits = 0;
-  for (const char c : text) {
-    const int value = base64_value(c);
-    if (value < 0) break;
-    buffer = (buffer << 6 | static_cast<unsigned>(value)) & 0xffffffU;
-    bits += 6;
-    if (bits < 8) continue;
-    bits -= 8;
-    bytes.push_back(static_cast<char>(buffer >> bits & 0xffU));
-  }
-  return bytes;
-}
-
 /// The token in an Authorization value; empty when there is none.
 std::string token_in(std::string_view value) {
   if (value.starts_with("Bearer ")) return std::string(value.substr(7));
   if (!value.starts_with("Basic ")) return {};
-  const std::string pair = base64_decode(value.substr(6));
+  const auto bytes = base64_decode(value.substr(6));
+  if (!bytes) return {};
+  const std::string pair(bytes->begin(), bytes->end());
   const std::size_t colon = pair.find(':');
   return colon == std::string::npos ? std::string() : pair.substr(colon + 1);
 }
@@ -95,6 +77,12 @@ bool read_word(std::string_view word, AccessToken& token, bool& scopes_given) {
   if (name == "jobs") return read_number(value, token.max_jobs);
   if (name == "uploads") return read_number(value, token.max_uploads);
   if (name == "rate") return read_number(value, token.rate);
+  if (name == "daily_mb") {
+    const bool read = read_number(value, token.max_daily_bytes) && token.max_daily_bytes <= kMostMegabytes;
+    token.max_daily_bytes <<= 20;
+    return read;
+  }
+  if (name == "keep_days") return read_number(value, token.keep_days) && token.keep_days <= kMostDays;
   if (name == "tenant") {
     token.tenant = value;
     return is_name(value);
@@ -115,7 +103,8 @@ std::optional<AccessToken> token_of_line(const std::string& line) {
     if (!read_word(word, token, scopes_given)) return std::nullopt;
   }
   if (!scopes_given && !token.tenant.empty()) token.admin = false;
-  if (token.admin && (!token.tenant.empty() || token.max_jobs > 0)) return std::nullopt;  // it stands for nobody
+  const bool limited = token.max_jobs > 0 || token.max_daily_bytes > 0 || token.keep_days > 0;
+  if (token.admin && (!token.tenant.empty() || limited)) return std::nullopt;  // it stands for nobody
   return token;
 }
 
@@ -135,13 +124,27 @@ Result<std::vector<AccessToken>> read_tokens(const std::string& file) {
       return fault(
           "bad_token_file",
           "a line is a token of 43 characters of A-Z, a-z, 0-9, - and _, and after it tenant=, scopes=, jobs=, "
-          "uploads=, rate=",
+          "uploads=, rate=, daily_mb=, keep_days=",
           "line " + std::to_string(number));
+    }
+    const auto differs = [&](const AccessToken& other) {
+      return other.tenant == token->tenant && other.keep_days * token->keep_days > 0 &&
+             other.keep_days != token->keep_days;
+    };
+    if (std::ranges::any_of(tokens, differs)) {
+      return fault("bad_token_file", "one tenant has two keep_days", "line " + std::to_string(number));
     }
     tokens.push_back(*token);
   }
   if (tokens.empty()) return fault("bad_token_file", "the token file holds no token");
   return tokens;
+}
+
+std::map<std::string, Millis> kept_by_tenant(const std::vector<AccessToken>& tokens) {
+  std::map<std::string, Millis> kept;
+  for (const AccessToken& token : tokens)
+    if (token.keep_days > 0) kept[token.tenant] = std::chrono::hours(24 * token.keep_days);
+  return kept;
 }
 
 std::optional<std::size_t> carried_token(const Head& head, const std::vector<AccessToken>& tokens) {

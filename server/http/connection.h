@@ -51,6 +51,7 @@ class ConnectionBody : public BodySource {
   ConnectionBody(Connection& connection, std::uint64_t length, bool expects_continue)
       : connection_(&connection), length_(length), expects_continue_(expects_continue) {}
   std::uint64_t length() const override { return length_; }
+  std::uint64_t taken() const override { return taken_; }
   Answer<std::size_t> read(std::span<std::uint8_t> out) override;
   /// All of it was taken: the connection may be closed without lingering.
   bool drained() const { return taken_ == length_; }

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <chrono>
 
+#include "server/api/upload_fields.h"
 #include "server/http/parse_head.h"
 
 namespace kiln {
@@ -51,14 +52,15 @@ class TextSink : public Sink {
   std::string text;
 };
 
-/// Puts the request id into a problem that a handler made without knowing it.
-void stamp(Reply& reply, const std::string& id) {
+/// Puts the request id into a problem that a handler made without knowing it, and notes its code.
+void stamp(Reply& reply, Request& request) {
   const bool is_problem = std::any_of(reply.fields.begin(), reply.fields.end(), [](const Field& field) {
     return field.name == "content-type" && field.value == kProblemType;
   });
   if (!is_problem) return;
   if (auto problem = parse_problem(reply.body)) {
-    problem->request_id = id;
+    problem->request_id = request.id;
+    request.refusal = problem->code;
     reply.body = problem_json(*problem);
   }
 }
@@ -84,13 +86,16 @@ Exchange::Exchange(ExchangeRules rules, Service& service, const Handlers& handle
                    Gate& uploads, HttpMetrics& metrics, LogLine log)
     : rules_(std::move(rules)),
       service_(service),
+      cors_(rules_.origins),
       visitors_(rules_.tokens, service),
       uploads_(uploads),
       metrics_(metrics),
       log_(std::move(log)),
       library_(handlers, elsewhere, [this](const Endpoint* endpoint, const Handler& handler, Request& request) {
         Reply reply = dispatch(endpoint, handler, request);
-        stamp(reply, request.id);
+        stamp(reply, request);
+        if (endpoint != nullptr && endpoint->tag == "uploads") reply.fields.push_back({"tus-resumable", kTusVersion});
+        cors_.open(reply, request.head);
         return reply;
       }) {}
 
@@ -104,7 +109,7 @@ Answer<void> Exchange::check_origin(const Head& head) const {
   const std::string_view site = field_of(head, "sec-fetch-site");  // only browsers send it, and truthfully
   const bool foreign =
       site.empty() ? !origin.empty() && without_scheme(origin) != host : site != "same-origin" && site != "none";
-  if (changes_something(head) && foreign)
+  if (changes_something(head) && foreign && !cors_.allows(head))
     return refuse("cross_origin", "pages of other origins may not change anything here");
   return {};
 }
@@ -139,6 +144,7 @@ Answer<void> Exchange::check_body(const Head& head, const Endpoint& endpoint) co
 
 Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Request& request) {
   if (auto origin = check_origin(request.head); !origin) return problem_reply(origin.error());
+  if (cors_.is_preflight(request.head)) return Cors::preflight(handler(request));  // it carries no token
   auto visitor = check_token(request.head, endpoint);
   if (!visitor) return problem_reply(visitor.error());
   request.service = *visitor == nullptr ? &service_ : &(*visitor)->service;
@@ -151,6 +157,25 @@ Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Reque
   const Pass shared = uploads_.enter();
   if (!shared) return problem_reply(make_problem("overloaded", "too many uploads at once; try again in a moment"));
   request.upload = std::make_shared<std::pair<Pass, Pass>>(own, shared);
+  return take_body(handler, request, *visitor);
+}
+
+/// The bytes of the day are counted as announced; those that did not come are given back.
+Reply Exchange::take_body(const Handler& handler, Request& request, Visitor* visitor) {
+  if (visitor == nullptr || visitor->token.max_daily_bytes == 0) return handler(request);
+  struct Charge {
+    Service& service;
+    const AccessToken& token;
+    const BodySource& body;
+    ~Charge() {
+      const std::uint64_t missing = body.length() - body.taken();
+      if (missing > 0) static_cast<void>(service.refund_upload(token.tenant, missing));
+    }
+  };
+  const AccessToken& token = visitor->token;
+  const auto charged = visitor->service.charge_upload(token.tenant, request.body->length(), token.max_daily_bytes);
+  if (!charged) return problem_reply(problem_of(charged.error()));
+  const Charge charge{visitor->service, token, *request.body};
   return handler(request);
 }
 
@@ -159,19 +184,23 @@ bool Exchange::serve(Connection& connection, std::string_view head_text, const s
   auto head = parse_head(head_text);
   Request request;
   if (head) request.head = std::move(*head);
-  request.peer = peer;
+  const bool forwarded = count_fields(request.head, "x-forwarded-for") == 1;
+  request.peer = forwarded ? client_address(peer, field_of(request.head, "x-forwarded-for"), rules_.proxies) : peer;
   request.client = &connection;
   request.id = request_id_of(field_of(request.head, "x-request-id"));
   ConnectionBody body(connection, request.head.content_length.value_or(0),
                       field_of(request.head, "expect") == "100-continue");
   request.body = &body;
 
-  if (!head) head.error().request_id = request.id;
+  if (!head) {
+    head.error().request_id = request.id;
+    request.refusal = head.error().code;
+  }
   const Outcome outcome = head ? library_.serve(request) : library_.refuse(head.error(), connection);
 
   AccessEntry entry;
   entry.request_id = request.id;
-  entry.peer = peer;
+  entry.peer = request.peer;
   entry.method = request.head.method;
   entry.path = request.head.path;
   entry.operation = outcome.operation;
@@ -179,7 +208,7 @@ bool Exchange::serve(Connection& connection, std::string_view head_text, const s
   entry.status = outcome.status;
   entry.bytes = connection.bytes_written();
   entry.seconds = seconds_since(begin);
-  metrics_.request(entry.operation, entry.status, entry.seconds);
+  metrics_.request(entry.operation, entry.status, entry.seconds, request.refusal);
   if (log_) log_(access_line(entry));
   // After a refusal bytes may still be on their way, announced or not.
   return outcome.status > 0 && outcome.status < 400 && body.drained();

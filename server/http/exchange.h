@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "server/http/access_log.h"
+#include "server/http/addresses.h"
 #include "server/http/connection.h"
+#include "server/http/cors.h"
 #include "server/http/gate.h"
 #include "server/http/httplib_server.h"
 #include "server/http/metrics.h"
@@ -16,8 +18,10 @@ namespace kiln {
 
 struct ExchangeRules {
   std::uint64_t max_upload_bytes = 8ull << 30;
-  std::vector<std::string> hosts;   // names a Host field may have; empty: any
-  std::vector<AccessToken> tokens;  // who may come in (auth.h); empty: everybody
+  std::vector<std::string> hosts;    // names a Host field may have; empty: any
+  std::vector<std::string> origins;  // whose pages may read and change; empty: none
+  AddressList proxies;               // whose X-Forwarded-For is believed
+  std::vector<AccessToken> tokens;   // who may come in (auth.h); empty: everybody
 };
 
 class Exchange {
@@ -36,9 +40,11 @@ class Exchange {
   Answer<void> check_body(const Head&, const Endpoint&) const;
   Answer<Visitor*> check_token(const Head&, const Endpoint*) const;
   Answer<void> check_origin(const Head&) const;
+  Reply take_body(const Handler&, Request&, Visitor*);
 
   ExchangeRules rules_;
   Service& service_;
+  Cors cors_;
   Visitors visitors_;
   Gate& uploads_;
   HttpMetrics& metrics_;

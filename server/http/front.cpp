@@ -94,7 +94,8 @@ struct Front::State {
   }
 
   void admit(int fd, const Peer& peer) {
-    if (!peer.loopback && guests.from(peer.address) >= options.max_per_address) {
+    const bool many = peer.loopback || options.proxies.holds(peer.address);
+    if (!many && guests.from(peer.address) >= options.max_per_address) {
       count([](FrontStats& s) { ++s.over_address_cap; });
       ::close(fd);
       return;

@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "core/base/result.h"
+#include "server/http/addresses.h"
 #include "server/http/connection.h"
 
 namespace kiln {
@@ -24,7 +25,8 @@ struct FrontOptions {
   int threads = 96;
   int backlog = 1024;
   std::size_t max_connections = 4096;
-  std::size_t max_per_address = 1024;  // not counted for loopback: a reverse proxy may stand there
+  std::size_t max_per_address = 1024;  // not counted for loopback and for these
+  AddressList proxies;                 // reverse proxies: many clients come from one address
   std::size_t max_queued = 1024;       // complete heads that wait for a worker
   std::size_t head_bytes = 32u << 10;
   std::chrono::milliseconds head_deadline{5000};

@@ -22,6 +22,7 @@ FrontOptions front_options(const HttpOptions& options) {
   FrontOptions front = options.front;
   front.address = options.address;
   front.port = options.port;
+  front.proxies = options.proxies;
   front.threads = options.max_uploads + options.max_streams + options.max_downloads + options.quick_threads;
   return front;
 }
@@ -37,7 +38,7 @@ void raise_descriptor_limit() {
 Handlers all_routes(RouteContext& context) {
   Handlers all;
   for (Handlers part : {job_routes(context), event_routes(context), artifact_routes(context), asset_routes(context),
-                        recipe_routes(context), service_routes(context), viewer_routes()})
+                        upload_routes(context), recipe_routes(context), service_routes(context), viewer_routes()})
     all.merge(part);
   return all;
 }
@@ -71,9 +72,15 @@ struct HttpServer::State {
         uploads(options.max_uploads),
         streams(options.max_streams),
         downloads(options.max_downloads),
-        context{s, streams, downloads, draining, options.heartbeat, [this] { return metrics_text(); }},
-        exchange({options.max_upload_bytes, options.hosts, options.tokens}, s, all_routes(context), viewer_file,
-                 uploads, metrics, options.log),
+        context{s,
+                streams,
+                downloads,
+                draining,
+                options.heartbeat,
+                [this] { return metrics_text(); },
+                options.max_upload_bytes},
+        exchange({options.max_upload_bytes, options.hosts, options.origins, options.proxies, options.tokens}, s,
+                 all_routes(context), viewer_file, uploads, metrics, options.log),
         front(
             front_options(options),
             [this](Connection& connection, std::string_view head, const std::string& peer) {
@@ -83,14 +90,13 @@ struct HttpServer::State {
 
   std::string metrics_text() {
     MetricsInput in;
-    in.served = metrics.snapshot();
     in.front = front.stats();
     in.service = service.stats();
     in.uploads = uploads.inside();
     in.streams = streams.inside();
     in.downloads = downloads.inside();
     in.now_ms = now_ms();
-    return prometheus_text(in);
+    return metrics.text(in);
   }
 };
 

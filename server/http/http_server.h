@@ -28,10 +28,12 @@ struct HttpOptions {
   int max_downloads = 16;
   int quick_threads = 16;                       // beside those
   std::chrono::milliseconds heartbeat{10'000};  // longest silence of an event stream
-  std::vector<std::string> hosts;   // names a Host field may have; empty: any. A local server should list its own
-  std::vector<AccessToken> tokens;  // from read_tokens (auth.h); empty: nobody is asked
-  LogLine log = log_to_stderr;      // one JSON line per request; empty: none
-  FrontOptions front;               // address, port and threads are taken from above
+  std::vector<std::string> hosts;    // names a Host field may have; empty: any. A local server should list its own
+  std::vector<std::string> origins;  // of pages that may read and change; each passes is_origin (cors.h); empty: none
+  AddressList proxies;               // whose X-Forwarded-For is believed
+  std::vector<AccessToken> tokens;   // from read_tokens (auth.h); empty: nobody is asked
+  LogLine log = log_to_stderr;       // one JSON line per request; empty: none
+  FrontOptions front;                // address, port, threads and proxies are taken from above
 };
 
 /// Host names of a server that only this machine should reach: guards against DNS rebinding.

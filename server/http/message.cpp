@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <ctime>
 
 #include "core/base/expects.h"
 
@@ -49,17 +50,28 @@ Reply json_reply(int status, std::string json) {
   return reply;
 }
 
+namespace {
+
+/// Seconds until a client that was told so may try again.
+std::int64_t retry_after(const Problem& problem) {
+  if (problem.code != "daily_quota") return problem.status == 507 ? 60 : 2;
+  constexpr std::int64_t kDay = 24 * 3600;
+  return kDay - std::time(nullptr) % kDay;
+}
+
+}  // namespace
+
 Reply problem_reply(const Problem& problem) {
   Reply reply;
   reply.status = problem.status;
   reply.fields.push_back({"content-type", kProblemType});
   reply.fields.push_back({"cache-control", "no-store"});
-  if (problem.status == 429 || problem.status == 503) reply.fields.push_back({"retry-after", "2"});
+  if (problem.status == 429 || problem.status == 503 || problem.status == 507)
+    reply.fields.push_back({"retry-after", std::to_string(retry_after(problem))});
   if (problem.status == 401) {  // a browser asks its user for the second
     reply.fields.push_back({"www-authenticate", "Bearer realm=\"kiln\""});
     reply.fields.push_back({"www-authenticate", "Basic realm=\"kiln\", charset=\"UTF-8\""});
   }
-  if (problem.status == 507) reply.fields.push_back({"retry-after", "60"});
   reply.body = problem_json(problem);
   return reply;
 }

@@ -45,6 +45,7 @@ class BodySource {
  public:
   virtual ~BodySource() = default;
   virtual std::uint64_t length() const = 0;
+  virtual std::uint64_t taken() const = 0;  // bytes read so far
   /// Fills a part of `out`; 0 at the end. Problems: incomplete_body (400), timeout (408).
   virtual Answer<std::size_t> read(std::span<std::uint8_t> out) = 0;
 };
@@ -81,6 +82,7 @@ struct Request {
   Pass upload;                 // the place among the uploads; a handler that has read the body may leave it
   std::string id;              // X-Request-Id
   std::string peer;            // address
+  std::string refusal;         // code of the problem that was the answer; empty: none
   Service* service = nullptr;  // what of the service the one who asks may see
 };
 

@@ -20,6 +20,7 @@ JobReply job_reply(const Job& job) {
   reply.finished_at = rfc3339(job.finished_ms);
   reply.attempt = job.attempt;
   reply.cached = job.cached;
+  reply.pinned = job.pinned;
   reply.recipe = job.recipe;
   if (job.progress) reply.progress = progress_reply(*job.progress);
   if (job.error) {
@@ -28,6 +29,11 @@ JobReply job_reply(const Job& job) {
   }
   for (const Artifact& artifact : job.artifacts) reply.artifacts.push_back(artifact_reply(artifact));
   return reply;
+}
+
+EventReply event_reply(const JobEvent& event) {
+  return {event.id, rfc3339(event.at_ms), std::string(to_string(event.kind)), std::string(to_string(event.state)),
+          event.message};
 }
 
 Reply fault_reply(const Fault& fault) { return problem_reply(problem_of(fault)); }

@@ -10,6 +10,7 @@ namespace kiln {
 JobReply job_reply(const Job&);
 ProgressReply progress_reply(const JobProgress&);
 ArtifactReply artifact_reply(const Artifact&);
+EventReply event_reply(const JobEvent&);
 Reply fault_reply(const Fault&);
 
 }  // namespace kiln

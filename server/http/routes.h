@@ -19,12 +19,14 @@ struct RouteContext {
   const std::atomic<bool>& draining;
   std::chrono::milliseconds heartbeat{10'000};  // longest silence of an event stream
   std::function<std::string()> metrics_text;
+  std::uint64_t max_upload_bytes = 0;
 };
 
 Handlers job_routes(RouteContext&);
 Handlers event_routes(RouteContext&);
 Handlers artifact_routes(RouteContext&);
 Handlers asset_routes(RouteContext&);
+Handlers upload_routes(RouteContext&);
 Handlers recipe_routes(RouteContext&);
 Handlers service_routes(RouteContext&);
 Handlers viewer_routes();

@@ -71,7 +71,8 @@ Reply with_offset(Reply reply, Service& service, const std::string& sha256) {
 Reply store_piece(Service& service, Request& request, const std::string& sha256, const Piece& piece) {
   auto upload = service.put_asset({sha256, piece.offset, request.body->length()});
   if (!upload) return with_offset(fault_reply(upload.error()), service, sha256);
-  auto copied = copy_to_upload(**upload, [&](std::span<std::uint8_t> out) { return request.body->read(out); });
+  auto copied = copy_bytes([&](std::span<std::uint8_t> out) { return request.body->read(out); },
+                           [&](std::span<const std::uint8_t> bytes) { return (*upload)->write(bytes); });
   if (!copied) return problem_reply(copied.error());
   if (!piece.last) {
     const std::uint64_t bytes = (*upload)->bytes();
@@ -112,10 +113,22 @@ Reply get_asset(RouteContext& context, Request& request) {
   return serve_blob(request.head, std::move(*reader), {"application/octet-stream", sha256, sha256, std::move(pass)});
 }
 
+Reply pin_asset(Request& request) {
+  const std::string& sha256 = path_param(request, "sha256");
+  if (!is_sha256(sha256)) return problem_reply(bad_name(sha256));
+  const auto pinned = request.service->pin_asset(sha256, "", request.head.method == "PUT");
+  if (!pinned) return fault_reply(pinned.error());
+  Reply reply;
+  reply.status = 204;
+  return reply;
+}
+
 }  // namespace
 
 Handlers asset_routes(RouteContext& context) {
   return {{"putAsset", [&context](Request& request) { return put_asset(context, request); }},
+          {"pinAsset", pin_asset},
+          {"unpinAsset", pin_asset},
           {"postAsset", [&context](Request& request) { return post_asset(context, request); }},
           {"getAsset", [&context](Request& request) { return get_asset(context, request); }}};
 }

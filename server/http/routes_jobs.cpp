@@ -96,14 +96,35 @@ Reply delete_job(RouteContext&, Request& request) {
   return reply;
 }
 
+Reply pin_job(Request& request) {
+  const auto job = request.service->pin(path_param(request, "id"), request.head.method == "PUT");
+  return job ? job_document(200, *job) : fault_reply(job.error());
+}
+
+Reply job_history(Request& request) {
+  const std::string& id = path_param(request, "id");
+  const auto events = request.service->history(id);
+  if (!events) return fault_reply(events.error());
+  std::vector<EventReply> replies;
+  for (const JobEvent& event : *events) replies.push_back(event_reply(event));
+  return json_reply(200, history_json(id, replies));
+}
+
 }  // namespace
 
 Handlers job_routes(RouteContext& context) {
   const auto bind = [&context](Reply (*handler)(RouteContext&, Request&)) -> Handler {
     return [&context, handler](Request& request) { return handler(context, request); };
   };
-  return {{"createJob", bind(create_job)}, {"createJobFromFile", bind(create_job)}, {"listJobs", bind(list_jobs)},
-          {"getJob", bind(get_job)},       {"cancelJob", bind(cancel_job)},         {"deleteJob", bind(delete_job)}};
+  return {{"createJob", bind(create_job)},
+          {"createJobFromFile", bind(create_job)},
+          {"listJobs", bind(list_jobs)},
+          {"getJob", bind(get_job)},
+          {"cancelJob", bind(cancel_job)},
+          {"deleteJob", bind(delete_job)},
+          {"jobHistory", job_history},
+          {"pinJob", pin_job},
+          {"unpinJob", pin_job}};
 }
 
 }  // namespace kiln

@@ -131,13 +131,13 @@ Answer<Submission> submission_of_scene(Request& request, Service& service) {
 
 }  // namespace
 
-Answer<void> copy_to_upload(AssetUpload& upload, const ReadBytes& read) {
+Answer<void> copy_bytes(const ReadBytes& read, const WriteBytes& write) {
   std::vector<std::uint8_t> piece(kPieceBytes);
   while (true) {
     auto got = read(piece);
     if (!got) return tl::make_unexpected(got.error());
     if (*got == 0) return {};
-    if (auto written = upload.write(std::span(piece).first(*got)); !written)
+    if (auto written = write(std::span(piece).first(*got)); !written)
       return tl::make_unexpected(problem_of(written.error()));
   }
 }
@@ -145,7 +145,8 @@ Answer<void> copy_to_upload(AssetUpload& upload, const ReadBytes& read) {
 Answer<StoredBlob> store_asset(Service& service, const AssetRequest& asset, const ReadBytes& read) {
   auto upload = service.put_asset(asset);
   if (!upload) return tl::make_unexpected(problem_of(upload.error()));
-  if (auto copied = copy_to_upload(**upload, read); !copied) return tl::make_unexpected(copied.error());
+  const auto write = [&](std::span<const std::uint8_t> bytes) { return (*upload)->write(bytes); };
+  if (auto copied = copy_bytes(read, write); !copied) return tl::make_unexpected(copied.error());
   auto stored = (*upload)->finish();
   if (!stored) return tl::make_unexpected(problem_of(stored.error()));
   return *stored;

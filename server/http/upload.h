@@ -16,8 +16,9 @@ using ReadBytes = std::function<Answer<std::size_t>(std::span<std::uint8_t>)>;
 /// Stores what `read` gives as an asset.
 Answer<StoredBlob> store_asset(Service&, const AssetRequest&, const ReadBytes& read);
 
-/// Copies all bytes into an open upload without finishing it.
-Answer<void> copy_to_upload(AssetUpload&, const ReadBytes& read);
+/// Hands all bytes on, piece by piece.
+using WriteBytes = std::function<Result<void>(std::span<const std::uint8_t>)>;
+Answer<void> copy_bytes(const ReadBytes& read, const WriteBytes& write);
 
 /// The job that a request of POST /v1/jobs, PUT /v1/jobs or POST /v1/plan describes, its files stored:
 /// application/json, multipart/form-data, or a bare scene with ?preset=.

@@ -65,9 +65,10 @@ struct Job {
   bool force = false;       // bake even if the result is known
   bool cached = false;      // the artefacts come from an earlier job
   bool cancel_requested = false;
-  int attempt = 0;  // 1 while it runs for the first time
-  int crashes = 0;  // attempts that ended by a signal
-  int retries = 0;  // attempts lost to the machine (disk full, spawn failed)
+  bool pinned = false;  // kept until somebody unpins it
+  int attempt = 0;      // 1 while it runs for the first time
+  int crashes = 0;      // attempts that ended by a signal
+  int retries = 0;      // attempts lost to the machine (disk full, spawn failed)
   std::int64_t created_ms = 0, started_ms = 0, finished_ms = 0;
   std::uint64_t version = 0;            // id of its newest event: grows with every change of the row
   std::optional<JobProgress> progress;  // while running

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -75,8 +76,15 @@ struct Retry {
   Millis delay{0};
 };
 
+/// How long jobs that ended are kept; 0: for ever.
+struct Retention {
+  Millis others{0};                       // of tenants that are not among
+  std::map<std::string, Millis> tenants;  // these
+};
+
 struct StoreCounts {
   std::uint64_t queued = 0, running = 0, succeeded = 0, failed = 0, canceled = 0;
+  std::uint64_t pinned = 0;
   std::int64_t oldest_queued_ms = 0;  // creation time; 0 when nothing waits
 };
 
@@ -89,7 +97,7 @@ class BlobGate {
 
 /// Codes of faults: store_failed, store_unavailable (no connection to the database now: try again), disk_full (the
 /// database cannot grow), not_found, bad_cursor, queue_full, quota, idempotency_mismatch, asset_not_found, poisoned
-/// (the same content crashed its worker twice within 24 h), not_terminal.
+/// (the same content crashed its worker twice within 24 h), not_terminal, pinned, daily_quota.
 class JobStore {
  public:
   virtual ~JobStore() = default;
@@ -116,8 +124,13 @@ class JobStore {
 
   /// queued -> canceled at once; running -> flagged; terminal -> unchanged. Returns the job after it.
   virtual Result<Job> cancel(const std::string& id) = 0;
-  /// Forgets a terminal job and its events. Removing an unknown job is done already.
+  /// Forgets a terminal job and its events, unless it is "pinned". Removing an unknown job is done already.
   virtual Result<void> remove(const std::string& id) = 0;
+  /// A pinned job is kept, with its inputs and artefacts, whatever its age. Returns the job after it.
+  virtual Result<Job> pin(const std::string& id, bool pinned) = 0;
+  /// Forgets jobs that ended longer ago than their tenant keeps them, unless they are pinned. Returns how many; with
+  /// `only_count` how many it would be.
+  virtual Result<int> forget_old_jobs(const Retention&, bool only_count = false) = 0;
 
   virtual Result<Job> get(const std::string& id) = 0;
   virtual Result<JobPage> list(const JobQuery&) = 0;
@@ -136,8 +149,17 @@ class JobStore {
   virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant = {}) = 0;
   /// Whether the tenant has the blob; without one: whether anybody has.
   virtual Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant = {}) = 0;
-  /// Forgets blobs that nothing refers to and nobody touched for `grace`, and returns them: their files may go now.
-  virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace) = 0;
+  /// A blob that a tenant pinned is kept whether a job needs it or not. "not_found" when the tenant has none.
+  virtual Result<void> pin_blob(const std::string& sha256, const std::string& tenant, bool pinned) = 0;
+  /// Forgets blobs that nothing refers to, nobody pinned and nobody touched for `grace`, and returns them: their files
+  /// may go now. With `only_count` they stay.
+  virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count = false) = 0;
+
+  /// Adds to what the tenant uploaded today (UTC, the store's day). "daily_quota", and nothing added, when that would
+  /// be more than `limit` (0: none).
+  virtual Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
+  /// Takes back what was charged and did not come.
+  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) = 0;
 
   /// Among those who make blobs; waits while somebody removes some.
   virtual Result<std::unique_ptr<BlobGate>> enter_blob_gate() = 0;

@@ -3,7 +3,7 @@
 namespace kiln::sql {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 // The same columns, checks and triggers as in sqlite_schema.cpp. What differs:
 // - Events get their ids while the writer holds a lock to the end of its transaction: ids grow in the order in which
@@ -119,14 +119,28 @@ END $$;
 CREATE TRIGGER job_event_is_numbered BEFORE INSERT ON job_event FOR EACH ROW EXECUTE FUNCTION number_event();
 )sql";
 
+// From version 1 to 2: pins, and how much a tenant uploads a day.
+constexpr const char* kVersion2 = R"sql(
+ALTER TABLE kiln.job ADD COLUMN pinned BIGINT NOT NULL DEFAULT 0 CHECK(pinned IN (0, 1));
+ALTER TABLE kiln.blob_tenant ADD COLUMN pinned BIGINT NOT NULL DEFAULT 0 CHECK(pinned IN (0, 1));
+CREATE TABLE kiln.upload_day(
+  tenant kiln.word NOT NULL,
+  day BIGINT NOT NULL, -- since 1970
+  bytes BIGINT NOT NULL CHECK(bytes >= 0),
+  PRIMARY KEY(tenant, day)
+);
+UPDATE kiln.meta SET version=2;
+)sql";
+
 Result<void> make_or_check(PostgresConnection& db) {
   KILN_DO(db.query("SELECT pg_advisory_xact_lock(1802071150, 0)"));  // "kiln" as a number; released with the end
   KILN_TRY(found, db.query("SELECT to_regclass('kiln.meta')::text"));
   if (found.front().is_null(0)) {
     KILN_DO(db.execute("CREATE SCHEMA IF NOT EXISTS kiln"));
-    return db.execute(kTables);
+    KILN_DO(db.execute(kTables));
   }
   KILN_TRY(version, db.query("SELECT version FROM kiln.meta"));
+  if (version.front().integer(0) == 1) return db.execute(kVersion2);
   if (version.front().integer(0) == kVersion) return {};
   return fault("schema_too_new", "the job store was written by another version of this program (schema " +
                                      std::to_string(version.front().integer(0)) + ", this one knows " +

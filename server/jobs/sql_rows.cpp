@@ -53,7 +53,7 @@ const char* const kJobColumns =
     "id, state, tenant, label, recipe, content_key, force, cached, cancel_requested_at, attempt, crashes, retries, "
     "created_at, "
     "started_at, finished_at, version, stage, done, total, fraction, eta_s, error_code, error_message, error_where, "
-    "error_status";
+    "error_status, pinned";
 
 Job read_job(const Row& row) {
   Job job;
@@ -75,6 +75,7 @@ Job read_job(const Row& row) {
   job.version = static_cast<std::uint64_t>(row.integer(15));
   if (job.state == JobState::running) job.progress = read_progress(row, 16);
   job.error = read_error(row, 21);
+  job.pinned = row.integer(25) != 0;
   return job;
 }
 

@@ -30,6 +30,8 @@ class SqlStore final : public JobStore {
 
   Result<Job> cancel(const std::string& id) override;
   Result<void> remove(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override;
+  Result<int> forget_old_jobs(const Retention&, bool only_count) override;
 
   Result<Job> get(const std::string& id) override;
   Result<JobPage> list(const JobQuery&) override;
@@ -42,7 +44,10 @@ class SqlStore final : public JobStore {
   Result<void> log(const std::string& job_id, const std::string& line) override;
   Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) override;
   Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) override;
-  Result<std::vector<std::string>> forget_unused_blobs(Millis grace) override;
+  Result<void> pin_blob(const std::string& sha256, const std::string& tenant, bool pinned) override;
+  Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count) override;
+  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override;
   Result<std::string> identity() override;
   Result<void> check_writable() override;
 

@@ -39,9 +39,11 @@ Result<std::optional<Claim>> SqlStore::claim(Millis lease) {
         db.run("UPDATE job SET state='running', attempt=attempt+1, lease_owner=?, lease_until=?, fence=?, "
                "started_at=? WHERE id=?",
                claim.ref.token, now + lease.count(), claim.ref.fence, now, claim.ref.job_id));
-    KILN_DO(append_event(db, {claim.ref.job_id, EventKind::state, JobState::running, ""}, now));
     KILN_TRY(job, find_job(db, claim.ref.job_id));
+    const std::string which = "attempt " + std::to_string(job->attempt);
+    KILN_TRY(version, append_event(db, {claim.ref.job_id, EventKind::state, JobState::running, which}, now));
     claim.job = *job;
+    claim.job.version = version;
     return claim;
   });
 }
@@ -138,7 +140,7 @@ Result<Wrote> SqlStore::finish_cancel(const ClaimRef& ref) {
 
 namespace {
 
-Result<void> reap_one(Connection& db, const std::string& id, std::int64_t now) {
+Result<void> reap_one(Connection& db, const std::string& id, const char* why, std::int64_t now) {
   const std::string cancel = std::string("UPDATE job SET state='canceled', finished_at=?, ") + kClearRun +
                              " WHERE id=? AND cancel_requested_at IS NOT NULL";
   KILN_TRY(canceled, db.run(cancel, now, id));
@@ -150,7 +152,7 @@ Result<void> reap_one(Connection& db, const std::string& id, std::int64_t now) {
   const std::string requeue =
       std::string("UPDATE job SET state='queued', started_at=NULL, run_after=?, ") + kClearRun + " WHERE id=?";
   KILN_DO(db.run(requeue, now, id));
-  KILN_DO(append_event(db, {id, EventKind::state, JobState::queued, "its worker was lost"}, now));
+  KILN_DO(append_event(db, {id, EventKind::state, JobState::queued, why}, now));
   return {};
 }
 
@@ -161,7 +163,9 @@ Result<int> SqlStore::reap(bool everything) {
     // Rows that somebody writes to at this moment have a living owner, or the next round.
     const std::string lost = "SELECT id FROM job WHERE state='running' AND (?=1 OR lease_until<?)";
     KILN_TRY(rows, db.query(lost + engine_->keep_rows(true), everything ? 1 : 0, now));
-    for (const Row& row : rows) KILN_DO(reap_one(db, row.text(0), now));
+    const char* why =
+        everything ? "its server ended before it was done" : "its lease ended without a word of its server";
+    for (const Row& row : rows) KILN_DO(reap_one(db, row.text(0), why, now));
     return static_cast<int>(rows.all.size());
   });
 }

@@ -145,14 +145,4 @@ Result<Job> SqlStore::cancel(const std::string& id) {
   });
 }
 
-Result<void> SqlStore::remove(const std::string& id) {
-  return write([&](Connection& db, std::int64_t) -> Result<void> {
-    KILN_TRY(removed, db.run("DELETE FROM job WHERE id=? AND finished_at IS NOT NULL", id));
-    if (removed > 0) return {};
-    KILN_TRY(rows, db.query("SELECT 1 FROM job WHERE id=?", id));
-    if (!rows.empty()) return fault("not_terminal", "the job is still queued or running: cancel it first");
-    return {};
-  });
-}
-
 }  // namespace kiln::sql

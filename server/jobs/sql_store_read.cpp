@@ -1,4 +1,4 @@
-// What people ask: one job, pages of jobs, events; and the table of blobs.
+// What people ask: one job, pages of jobs, events.
 
 #include <algorithm>
 #include <charconv>
@@ -122,6 +122,8 @@ Result<StoreCounts> SqlStore::counts() {
           break;
       }
     }
+    KILN_TRY(pinned, db.query("SELECT count(*) FROM job WHERE pinned=1"));
+    counts.pinned = static_cast<std::uint64_t>(pinned.front().integer(0));
     return counts;
   });
 }
@@ -167,38 +169,6 @@ Result<void> SqlStore::log(const std::string& job_id, const std::string& line) {
     if (!job) return {};  // removed meanwhile: nobody reads its log
     KILN_DO(append_event(db, {job_id, EventKind::log, job->state, line}, now));
     return {};
-  });
-}
-
-Result<void> note_blob(Connection& db, const BlobNote& blob, std::int64_t now) {
-  KILN_DO(db.run("INSERT INTO blob VALUES(?,?,?) ON CONFLICT(sha256) DO UPDATE SET last_ref_at=excluded.last_ref_at",
-                 blob.sha256, blob.bytes, now));
-  KILN_DO(db.run("INSERT INTO blob_tenant VALUES(?,?) ON CONFLICT DO NOTHING", blob.sha256, blob.tenant));
-  return {};
-}
-
-Result<void> SqlStore::touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) {
-  return write([&](Connection& db, std::int64_t now) { return note_blob(db, {sha256, bytes, tenant}, now); });
-}
-
-Result<bool> SqlStore::knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) {
-  return read([&](Connection& db) -> Result<bool> {
-    KILN_TRY(rows, tenant ? db.query("SELECT 1 FROM blob_tenant WHERE sha256=? AND tenant=?", sha256, *tenant)
-                          : db.query("SELECT 1 FROM blob WHERE sha256=?", sha256));
-    return !rows.empty();
-  });
-}
-
-Result<std::vector<std::string>> SqlStore::forget_unused_blobs(Millis grace) {
-  return write([&](Connection& db, std::int64_t now) -> Result<std::vector<std::string>> {
-    std::vector<std::string> forgotten;
-    KILN_TRY(rows, db.query("DELETE FROM blob WHERE last_ref_at<? "
-                            "AND NOT EXISTS(SELECT 1 FROM job_input i WHERE i.sha256=blob.sha256) "
-                            "AND NOT EXISTS(SELECT 1 FROM artifact a WHERE a.sha256=blob.sha256) "
-                            "RETURNING sha256",
-                            now - grace.count()));
-    for (const Row& row : rows) forgotten.push_back(row.text(0));
-    return forgotten;
   });
 }
 

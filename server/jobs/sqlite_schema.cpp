@@ -109,6 +109,18 @@ CREATE TABLE identity(id TEXT NOT NULL) STRICT;
 INSERT INTO identity SELECT lower(hex(randomblob(16)));
 )sql";
 
+// From version 2 to 3: pins, and how much a tenant uploads a day.
+constexpr const char* kVersion3 = R"sql(
+ALTER TABLE job ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK(pinned IN (0, 1));
+ALTER TABLE blob_tenant ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK(pinned IN (0, 1));
+CREATE TABLE upload_day(
+  tenant TEXT NOT NULL,
+  day INTEGER NOT NULL, -- since 1970
+  bytes INTEGER NOT NULL CHECK(bytes >= 0),
+  PRIMARY KEY(tenant, day)
+) STRICT;
+)sql";
+
 struct Setting {
   const char* set;
   const char* read;
@@ -171,8 +183,9 @@ Result<void> make_tables(SqliteConnection& db) {
   KILN_TRY(transaction, Transaction::begin(db));
   KILN_TRY(version, single_value(db, "PRAGMA user_version"));
   if (version == "0") KILN_DO(db.execute(kTables));
-  if (version == "0" || version == "1") {
-    KILN_DO(db.execute(kVersion2));
+  if (version == "0" || version == "1") KILN_DO(db.execute(kVersion2));
+  if (version == "0" || version == "1" || version == "2") {
+    KILN_DO(db.execute(kVersion3));
     KILN_DO(db.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion)));
   } else if (version != std::to_string(kSchemaVersion)) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "server/http/auth.h"
+#include "server/http/cors.h"
 #include "server/http/http_server.h"
 #include "server/kilnd/options.h"
 #include "server/work/admin.h"
@@ -22,8 +23,8 @@ namespace {
 
 int complain(const Fault& fault) {
   std::fprintf(stderr, "kilnd: %s\n", fault.message.c_str());
-  for (const char* config :
-       {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused", "blobs_of_another"}) {
+  for (const char* config : {"data_in_use", "schema_too_new", "store_unsafe", "bad_token_file", "blobs_refused",
+                             "blobs_of_another", "bad_origin", "bad_address"}) {
     if (fault.code == config) return kExitConfig;
   }
   return 1;
@@ -48,6 +49,17 @@ std::thread drain_on_signal(HttpServer& server, Service& service) {
   });
 }
 
+/// The options of the service, with what the token file says of retention. A worker of a fleet knows no tokens, and
+/// leaves old jobs to those who do.
+Result<ServiceOptions> with_retention(const DaemonOptions& options) {
+  ServiceOptions service = options.service;
+  if (options.worker_only) service.retention = {};
+  if (options.token_file.empty()) return service;
+  KILN_TRY(tokens, read_tokens(options.token_file));
+  service.retention.tenants = kept_by_tenant(tokens);
+  return service;
+}
+
 Result<HttpOptions> http_options(const DaemonOptions& options) {
   HttpOptions http;
   http.address = options.address;
@@ -55,6 +67,12 @@ Result<HttpOptions> http_options(const DaemonOptions& options) {
   http.max_upload_bytes = options.max_upload_mb << 20;
   if (is_loopback(options.address)) http.hosts = loopback_hosts();
   if (options.quiet) http.log = {};
+  for (const std::string& origin : options.cors_origins) {
+    if (!is_origin(origin)) return fault("bad_origin", "'" + origin + "' is no origin like https://studio.example");
+  }
+  http.origins = options.cors_origins;
+  KILN_TRY(proxies, AddressList::of(options.trusted_proxies));
+  http.proxies = std::move(proxies);
   if (!options.token_file.empty()) {
     KILN_TRY(tokens, read_tokens(options.token_file));
     http.tokens = std::move(tokens);
@@ -89,8 +107,14 @@ int work(Service& service) {
 
 Result<std::string> admin_answer(const DaemonOptions& options, bool& sound) {
   if (options.admin == "stats") return admin_stats(options.service);
-  if (options.admin == "gc") return admin_gc(options.service);
-  if (options.admin == "backup") return admin_backup(options.service, options.admin_folder);
+  if (options.admin == "gc") {
+    KILN_TRY(rules, with_retention(options));
+    return admin_gc(rules, options.dry_run);
+  }
+  if (options.admin == "backup") return admin_backup(options.service, options.admin_object);
+  if (options.admin == "pin" || options.admin == "unpin") {
+    return admin_pin(options.service, {options.admin_object, options.admin_tenant, options.admin == "pin"});
+  }
   KILN_TRY(scrub, admin_scrub(options.service));
   sound = scrub.sound;
   return scrub.json;
@@ -111,7 +135,9 @@ int serve(const DaemonOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);
   const auto http = http_options(options);
   if (!http) return complain(http.error());
-  auto service = Service::open(options.service);
+  const auto rules = with_retention(options);
+  if (!rules) return complain(rules.error());
+  auto service = Service::open(*rules);
   if (!service) return complain(service.error());
   if (options.worker_only) return work(**service);
   HttpServer server(*http, **service);

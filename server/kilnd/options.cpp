@@ -27,7 +27,7 @@ CLI::Option* add(CLI::App& app, const std::string& flag, T& value, const std::st
 /// Values that have no member of their own type in ServiceOptions.
 struct RawOptions {
   std::string data = "kiln-data", worker_command;
-  double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10, lease_s = 60;
+  double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10, lease_s = 60, keep_days = 0;
 };
 
 void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
@@ -45,6 +45,12 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   add(app, "--threads", options.service.threads, "threads of one worker; 0 shares the machine among the workers")
       ->check(CLI::Range(0, 1024));
   add(app, "--token-file", options.token_file, "file of bearer tokens, one a line; without it nobody is asked");
+  add(app, "--cors-origin", options.cors_origins,
+      "https://host[:port] whose pages may use this server from a browser; more with commas")
+      ->delimiter(',');
+  add(app, "--trusted-proxy", options.trusted_proxies,
+      "address or network of a reverse proxy whose X-Forwarded-For is believed; more with commas")
+      ->delimiter(',');
   add(app, "--max-upload-mb", options.max_upload_mb, "largest upload in MiB");
   add(app, "--max-queued", options.service.max_queued, "waiting jobs before new ones are refused with 429");
   add(app, "--soft-free-percent", raw.soft_percent, "less free disk than this refuses uploads")
@@ -52,6 +58,9 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   add(app, "--hard-free-percent", raw.hard_percent, "less free disk than this lets the queue wait")
       ->check(CLI::Range(0.0, 100.0));
   add(app, "--blob-grace-s", raw.blob_grace_s, "how long an unused asset is kept")->check(CLI::NonNegativeNumber);
+  add(app, "--keep-days", raw.keep_days,
+      "how long jobs that ended are kept, unless pinned or their token says keep_days=; 0: for ever")
+      ->check(CLI::Range(0.0, 36500.0));
   add(app, "--lease-s", raw.lease_s,
       "a job whose server is silent for so long goes to another; the same in all of a fleet")
       ->check(CLI::Range(1.0, 3600.0));
@@ -89,6 +98,7 @@ void finish(DaemonOptions& options, const RawOptions& raw) {
   options.service.soft_free_fraction = raw.soft_percent / 100;
   options.service.hard_free_fraction = raw.hard_percent / 100;
   options.service.blob_grace = Millis(static_cast<std::int64_t>(raw.blob_grace_s * 1000));
+  options.service.retention.others = Millis(static_cast<std::int64_t>(raw.keep_days * 24 * 3600 * 1000));
   options.service.lease = Millis(static_cast<std::int64_t>(raw.lease_s * 1000));
   options.service.first_retry = Millis(static_cast<std::int64_t>(raw.first_retry_s * 1000));
 }
@@ -105,10 +115,12 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   app.fallthrough();
   const CLI::App* worker = app.add_subcommand("worker", "bake for a fleet, without an HTTP server");
   CLI::App* admin = app.add_subcommand("admin", "look after a store and end; prints a line of JSON");
-  admin->add_option("what", options.admin, "stats, gc, scrub, or backup")
+  admin->add_option("what", options.admin, "stats, gc, scrub, backup, pin, or unpin")
       ->required()
-      ->check(CLI::IsMember({"stats", "gc", "scrub", "backup"}));
-  admin->add_option("folder", options.admin_folder, "a new folder for the backup");
+      ->check(CLI::IsMember({"stats", "gc", "scrub", "backup", "pin", "unpin"}));
+  admin->add_option("object", options.admin_object, "backup: a new folder; pin, unpin: a job's id or a file's SHA-256");
+  admin->add_option("--tenant", options.admin_tenant, "pin, unpin: whose file");
+  admin->add_flag("--dry-run", options.dry_run, "gc: tells how many would go");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -120,8 +132,9 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   if (tells_password(options.service.stores, argc, argv)) {
     return refuse("a password on the command line is seen by all: use PGPASSWORD, a passfile, or KILN_STORE");
   }
-  if ((options.admin == "backup") == options.admin_folder.empty()) {
-    std::fprintf(stderr, "kilnd: admin backup wants a folder, and nothing else does\n");
+  const bool wants_object = options.admin == "backup" || options.admin.ends_with("pin");
+  if (wants_object == options.admin_object.empty()) {
+    std::fprintf(stderr, "kilnd: admin backup wants a folder, pin and unpin a job or a file, and nothing else does\n");
     return tl::make_unexpected(EarlyExit{kExitUsage});
   }
   if (options.worker_only && options.service.stores.jobs.empty()) {

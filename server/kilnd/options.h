@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/work/service.h"
 
@@ -15,11 +16,14 @@ struct DaemonOptions {
   std::string address = "127.0.0.1";
   int port = 7878;  // 0: any free one
   std::string token_file;
+  std::vector<std::string> cors_origins, trusted_proxies;
   std::uint64_t max_upload_mb = 8192;
   bool quiet = false;        // no line per request
   bool worker_only = false;  // `kilnd worker`: bakes for a fleet and serves nobody
-  std::string admin;         // `kilnd admin WHAT`: stats, gc, scrub or backup, and then the end
-  std::string admin_folder;  // of a backup
+  std::string admin;         // `kilnd admin WHAT`: stats, gc, scrub, backup, pin or unpin, and then the end
+  std::string admin_object;  // the folder of a backup; the job or blob of a pin
+  std::string admin_tenant;  // whose blob
+  bool dry_run = false;      // of gc: tells and removes nothing
 };
 
 inline constexpr int kExitUsage = 2;

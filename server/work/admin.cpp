@@ -78,20 +78,34 @@ Result<std::string> admin_stats(const ServiceOptions& options) {
                 {"running", counts.running},
                 {"succeeded", counts.succeeded},
                 {"failed", counts.failed},
-                {"canceled", counts.canceled}}},
+                {"canceled", counts.canceled},
+                {"pinned", counts.pinned}}},
               {"blobs", blobs},
               {"blob_bytes", bytes},
               {"free_bytes", disk_space(stores.blobs->folder()).free_bytes}}
       .dump();
 }
 
-Result<std::string> admin_gc(const ServiceOptions& options) {
+Result<std::string> admin_gc(const ServiceOptions& options, bool only_count) {
   KILN_TRY(stores, open_stores(options));
+  KILN_TRY(forgotten, stores.jobs->forget_old_jobs(options.retention, only_count));
+  if (only_count) {
+    KILN_TRY(unused, stores.jobs->forget_unused_blobs(options.blob_grace, true));
+    return json{{"forgotten", forgotten}, {"removed", unused.size()}}.dump();
+  }
   EventBus bus;
   WorkCounters counters;
   const WorkOptions work;
   KILN_TRY(removed, collect_unused_blobs({*stores.jobs, *stores.blobs, bus, counters, work}, options.blob_grace));
-  return json{{"removed", removed}}.dump();
+  return json{{"forgotten", forgotten}, {"removed", removed}}.dump();
+}
+
+Result<std::string> admin_pin(const ServiceOptions& options, const PinOrder& order) {
+  KILN_TRY(stores, open_stores(options));
+  const auto done = is_sha256(order.what) ? stores.jobs->pin_blob(order.what, order.tenant, order.pinned)
+                                          : stores.jobs->pin(order.what, order.pinned).map([](const Job&) {});
+  if (!done) return tl::make_unexpected(done.error());
+  return json{{"pinned", order.pinned}}.dump();
 }
 
 Result<Scrub> admin_scrub(const ServiceOptions& options) {

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "server/blobs/partial_upload.h"
+
 namespace kiln {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr Millis kReapEvery{5000};
-constexpr double kPartialAgeS = 24 * 3600;
 
 /// Blobs whose row never came to be. Their age is the blob's own.
 Result<int> collect_orphans(const WorkPlace& place, Millis grace) {
@@ -57,7 +58,7 @@ void Housekeeping::stop() {
 }
 
 void Housekeeping::work() {
-  const Millis collect_every = std::clamp(grace_ / 20, Millis(1000), Millis(600'000));
+  const Millis collect_every = std::clamp(rules_.grace / 20, Millis(1000), Millis(600'000));
   auto collected = Clock::now();
   std::unique_lock lock(mutex_);
   const Millis reap_every = std::min(kReapEvery, place_.options.lease / 4);
@@ -79,8 +80,10 @@ void Housekeeping::tidy(bool collect) {
     place_.bus.announce();
   }
   if (!collect) return;
-  static_cast<void>(collect_unused_blobs(place_, grace_));  // a store that cannot write now: the next round
-  place_.blobs.expire_partials(kPartialAgeS);
+  const auto forgotten = place_.store.forget_old_jobs(rules_.retention);
+  if (forgotten) place_.counters.forgotten += static_cast<std::uint64_t>(*forgotten);
+  static_cast<void>(collect_unused_blobs(place_, rules_.grace));  // a store that cannot write now: the next round
+  place_.blobs.expire_partials(static_cast<double>(PartialUploads::kKept.count()));
   place_.blobs.remove_dead_writers();
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/durations.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
 #include "server/work/event_bus.h"
@@ -15,10 +16,10 @@ namespace kiln {
 
 struct WorkCounters {
   std::atomic<std::uint64_t> claimed{0}, succeeded{0}, failed{0}, canceled{0}, cached{0};
-  std::atomic<std::uint64_t> retried{0}, reaped{0}, lost_leases{0}, stale_commits{0};
+  std::atomic<std::uint64_t> retried{0}, reaped{0}, forgotten{0}, lost_leases{0}, stale_commits{0};
   std::atomic<std::uint64_t> deaths_signal{0}, deaths_memory{0}, deaths_timeout{0};
   std::atomic<std::uint64_t> bytes_uploaded{0};
-  std::atomic<std::int64_t> claim_latency_ms{0};
+  Durations claim_latency;
 };
 
 struct WorkOptions {

@@ -64,8 +64,13 @@ std::string request_hash(const NewJob& job) {
 /// The parts, in the order of their lives: each may use those above it.
 class LocalService final : public Service {
  public:
-  LocalService(ServiceOptions options, DataLock lock, std::unique_ptr<JobStore> store, std::unique_ptr<BlobStore> blobs)
-      : options_(std::move(options)), lock_(std::move(lock)), store_(std::move(store)), blobs_(std::move(blobs)) {}
+  LocalService(ServiceOptions options, DataLock lock, std::unique_ptr<TimedFiles> files,
+               std::unique_ptr<JobStore> store, std::unique_ptr<BlobStore> blobs)
+      : options_(std::move(options)),
+        lock_(std::move(lock)),
+        files_(std::move(files)),
+        store_(std::move(store)),
+        blobs_(std::move(blobs)) {}
   ~LocalService() override { drain(); }
 
   void start() override {
@@ -92,11 +97,36 @@ class LocalService final : public Service {
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
 
+  Result<std::vector<JobEvent>> history(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override {
+    auto job = store_->pin(id, pinned);
+    bus_.announce();
+    return job;
+  }
+  Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) override {
+    return store_->pin_blob(sha256, tenant, pinned);
+  }
+  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
+    return store_->charge_upload(tenant, bytes, limit);
+  }
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override {
+    return store_->refund_upload(tenant, bytes);
+  }
+
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
   std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
+
+  Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
+  Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) override {
+    return desk_.find(id, tenant);
+  }
+  Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& upload, std::uint64_t offset) override;
+  Result<void> remove_upload(const std::string& id, const std::string& tenant) override {
+    return desk_.remove(id, tenant);
+  }
 
   ServiceStats stats() override;
   std::vector<Check> checks() override;
@@ -106,6 +136,8 @@ class LocalService final : public Service {
   template <class Condition>
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
+  Result<void> check_room(std::uint64_t bytes) const;
+  Result<StoredBlob> register_blob(const std::string& tenant, const std::function<Result<StoredBlob>()>& store);
   bool may_claim() const { return disk().free_fraction >= options_.hard_free_fraction; }
   DiskSpace disk() const;
   WorkPlace place() { return {*store_, *blobs_, bus_, counters_, work_options_}; }
@@ -113,6 +145,7 @@ class LocalService final : public Service {
 
   const ServiceOptions options_;
   DataLock lock_;
+  std::unique_ptr<TimedFiles> files_;
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<BlobStore> blobs_;
   EventBus bus_;
@@ -121,8 +154,9 @@ class LocalService final : public Service {
   StopSignal plans_stop_;
   std::atomic<int> plans_{0};
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
-  Housekeeping housekeeping_{place(), options_.blob_grace};
+  Housekeeping housekeeping_{place(), {options_.blob_grace, options_.retention}};
   Neighbours neighbours_{place(), supervisor_};
+  UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};
 };
 
 class LocalUpload final : public AssetUpload {
@@ -133,12 +167,7 @@ class LocalUpload final : public AssetUpload {
   Result<void> write(std::span<const std::uint8_t> bytes) override { return writer_.write(bytes); }
   std::uint64_t bytes() const override { return writer_.bytes(); }
   Result<StoredBlob> finish() override {
-    KILN_TRY(gate, service_->store_->enter_blob_gate());
-    KILN_TRY(stored, writer_.finish());
-    auto noted = service_->store_->touch_blob(stored.sha256, stored.bytes, tenant_);
-    if (!noted) return tl::make_unexpected(noted.error());
-    service_->counters_.bytes_uploaded += stored.bytes;
-    return stored;
+    return service_->register_blob(tenant_, [this] { return writer_.finish(); });
   }
 
  private:
@@ -225,6 +254,8 @@ Result<Job> LocalService::cancel(const std::string& id) {
 }
 
 Result<void> LocalService::remove(const std::string& id) {
+  KILN_TRY(known, store_->get(id));
+  if (known.pinned) return fault("pinned", "the job is pinned: unpin it first");
   KILN_TRY(job, cancel(id));
   if (!is_terminal(job.state)) {
     KILN_TRY(ended, wait_done(id, kRemoveWait));
@@ -253,6 +284,11 @@ Result<std::unique_ptr<EventStream>> LocalService::subscribe(const std::string& 
   return std::make_unique<StoredEventStream>(*store_, bus_, job_id, after.value_or(last));
 }
 
+Result<std::vector<JobEvent>> LocalService::history(const std::string& id) {
+  KILN_TRY(job, store_->get(id));
+  return store_->events_after(0, job.id, kMaxHistory);
+}
+
 Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, store_->get(id));
   const auto found = std::ranges::find(job.artifacts, name, &Artifact::name);
@@ -261,12 +297,43 @@ Result<OpenArtifact> LocalService::open_artifact(const std::string& id, const st
   return OpenArtifact{*found, std::move(reader)};
 }
 
+Result<void> LocalService::check_room(std::uint64_t bytes) const {
+  const DiskSpace room = disk();
+  if (room.free_fraction >= options_.soft_free_fraction && room.free_bytes >= bytes) return {};
+  return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
+}
+
+/// Under the gate from the first name of the blob to its row.
+Result<StoredBlob> LocalService::register_blob(const std::string& tenant,
+                                               const std::function<Result<StoredBlob>()>& store) {
+  KILN_TRY(gate, store_->enter_blob_gate());
+  KILN_TRY(stored, store());
+  if (auto noted = store_->touch_blob(stored.sha256, stored.bytes, tenant); !noted) {
+    return tl::make_unexpected(noted.error());
+  }
+  counters_.bytes_uploaded += stored.bytes;
+  return stored;
+}
+
+Result<PartialUpload> LocalService::begin_upload(const PartialUpload& wanted) {
+  if (bus_.closed()) return draining();
+  if (auto room = check_room(wanted.length); !room) return tl::make_unexpected(room.error());
+  KILN_TRY(upload, desk_.begin(wanted));
+  if (!upload.done || has_asset(upload.sha256, upload.tenant)) return upload;
+  // It was complete, and its blob was collected meanwhile.
+  if (auto gone = desk_.remove(upload.id, upload.tenant); !gone) return tl::make_unexpected(gone.error());
+  return desk_.begin(wanted);
+}
+
+Result<std::unique_ptr<UploadPiece>> LocalService::append_upload(const PartialUpload& upload, std::uint64_t offset) {
+  if (bus_.closed()) return draining();
+  if (auto room = check_room(0); !room) return tl::make_unexpected(room.error());
+  return desk_.append(upload, offset);
+}
+
 Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
   if (bus_.closed()) return draining();
-  const DiskSpace room = disk();
-  if (room.free_fraction < options_.soft_free_fraction || room.free_bytes < request.expected) {
-    return fault("disk_full", "the disk of the server is nearly full: uploads wait until there is room");
-  }
+  if (auto room = check_room(request.expected); !room) return tl::make_unexpected(room.error());
   KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
   return std::make_unique<LocalUpload>(*this, std::move(writer), request.tenant);
 }
@@ -290,13 +357,16 @@ ServiceStats LocalService::stats() {
   stats.cached = counters_.cached;
   stats.retried = counters_.retried;
   stats.reaped = counters_.reaped;
+  stats.forgotten = counters_.forgotten;
   stats.lost_leases = counters_.lost_leases;
   stats.stale_commits = counters_.stale_commits;
   stats.deaths_signal = counters_.deaths_signal;
   stats.deaths_memory = counters_.deaths_memory;
   stats.deaths_timeout = counters_.deaths_timeout;
   stats.bytes_uploaded = counters_.bytes_uploaded;
-  stats.claim_latency_s_sum = static_cast<double>(counters_.claim_latency_ms) / 1000;
+  stats.claim_latency = counters_.claim_latency.snapshot();
+  stats.syncs = files_->syncs().snapshot();
+  stats.sandbox = sandbox_support();
   const DiskSpace room = disk();
   stats.free_fraction = room.free_fraction;
   stats.free_bytes = room.free_bytes;
@@ -338,7 +408,8 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
   if (auto sound = check_addresses(options.stores); !sound) return tl::make_unexpected(sound.error());
   KILN_TRY(lock, DataLock::take(options.data));
   KILN_TRY(store, open_job_store(options.stores, options.data));
-  KILN_TRY(blobs, open_blob_store(options.stores, options.data));
+  auto files = std::make_unique<TimedFiles>();
+  KILN_TRY(blobs, open_blob_store(options.stores, options.data, *files));
   if (auto ours = check_owner(options.stores, *store, *blobs); !ours) return tl::make_unexpected(ours.error());
   std::error_code error;
   std::filesystem::create_directories(options.data / "work", error);
@@ -352,7 +423,8 @@ Result<std::unique_ptr<Service>> Service::open(const ServiceOptions& given) {
     static_cast<void>(requeued);
   }
   remove_stale_checkpoints(options.data / "checkpoints", *store);
-  return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(store), std::move(blobs));
+  return std::make_unique<LocalService>(std::move(options), std::move(lock), std::move(files), std::move(store),
+                                        std::move(blobs));
 }
 
 }  // namespace kiln

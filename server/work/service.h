@@ -2,10 +2,10 @@
 // The whole service behind one door: submit, watch, cancel, fetch. The HTTP front talks to this and to nothing below.
 //
 // Fault codes and the status a front gives them:
-//   400 bad_cursor            404 not_found                 409 upload_busy, offset_mismatch, not_terminal
+//   400 bad_cursor            404 not_found                 409 upload_busy, offset_mismatch, not_terminal, pinned
 //   422 asset_not_found, idempotency_mismatch, hash_mismatch, poisoned, and every fault of an input (plan, jobs)
-//   429 queue_full, quota, plan_busy      503 draining             507 disk_full          500 store_failed, io_failed,
-//   internal
+//   429 queue_full, quota, daily_quota, plan_busy      503 draining             507 disk_full          500
+//   store_failed, io_failed, internal
 // Every function may be called from any thread. Those with a timeout block their caller for at most that long.
 
 #include <chrono>
@@ -18,9 +18,12 @@
 #include <vector>
 
 #include "core/bake/recipe.h"
+#include "core/base/durations.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/work/sandbox.h"
 #include "server/work/stores.h"
+#include "server/work/upload_desk.h"
 
 namespace kiln {
 
@@ -34,6 +37,7 @@ struct ServiceOptions {
   double soft_free_fraction = 0.10;  // below: uploads are refused with disk_full
   double hard_free_fraction = 0.05;  // below: nothing is claimed, the queue waits
   Millis blob_grace{24 * 3600 * 1000};
+  Retention retention;           // how long jobs that ended are kept
   Millis lease{60'000};          // a job whose server says nothing for so long is given to another
   Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
   bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
@@ -86,10 +90,12 @@ class EventStream {
 struct ServiceStats {
   StoreCounts jobs;
   std::uint64_t claimed = 0, succeeded = 0, failed = 0, canceled = 0, cached = 0;  // since start
-  std::uint64_t retried = 0, reaped = 0, lost_leases = 0, stale_commits = 0;
+  std::uint64_t retried = 0, reaped = 0, forgotten = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;
-  double claim_latency_s_sum = 0;  // created to claimed, over `claimed`
+  DurationCounts claim_latency;  // created to claimed
+  DurationCounts syncs;          // of blobs and their folders
+  Sandbox sandbox;               // what this kernel offers to lock workers in
   double free_fraction = 1;
   std::uint64_t free_bytes = 0;
 };
@@ -132,6 +138,14 @@ class Service {
   virtual Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                          std::optional<std::uint64_t> after) = 0;
 
+  /// What happened to a job, oldest first; of a long story the first kMaxHistory events.
+  static constexpr int kMaxHistory = 1000;
+  virtual Result<std::vector<JobEvent>> history(const std::string& id) = 0;
+
+  /// A pinned job, or asset (an artefact is one, too), is kept until it is unpinned. Unknown ones are not_found.
+  virtual Result<Job> pin(const std::string& id, bool pinned) = 0;
+  virtual Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) = 0;
+
   virtual Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) = 0;
   virtual Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) = 0;
   /// Whether the tenant has it; without one: whether anybody has.
@@ -139,6 +153,17 @@ class Service {
   /// Where an interrupted upload of `sha256` goes on.
   virtual std::uint64_t asset_offset(const std::string& sha256) = 0;
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;
+
+  /// Uploads in pieces; see UploadDesk. `wanted` has length, metadata, and expected if it is known.
+  virtual Result<PartialUpload> begin_upload(const PartialUpload& wanted) = 0;
+  virtual Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) = 0;
+  virtual Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& id_and_tenant,
+                                                             std::uint64_t offset) = 0;
+  virtual Result<void> remove_upload(const std::string& id, const std::string& tenant) = 0;
+
+  /// Counts what a tenant uploads a day; see JobStore.
+  virtual Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
+  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) = 0;
 
   virtual ServiceStats stats() = 0;
   /// Whether the service can take work, thing by thing.

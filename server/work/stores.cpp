@@ -59,16 +59,17 @@ Result<std::unique_ptr<JobStore>> open_job_store(const StoreOptions& options, co
   return open_postgres_store({options.jobs, {}});
 }
 
-Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions& options, const std::filesystem::path& data) {
-  if (options.blobs.empty()) return open_file_blobs(data);
-  if (options.blobs.starts_with(kDirectory)) return open_file_blobs(after(options.blobs, kDirectory));
+Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions& options, const std::filesystem::path& data,
+                                                   FileLayer& files) {
+  if (options.blobs.empty()) return open_file_blobs(data, files);
+  if (options.blobs.starts_with(kDirectory)) return open_file_blobs(after(options.blobs, kDirectory), files);
   S3Options s3;
   s3.endpoint = options.s3_endpoint;
   s3.bucket = after(options.blobs, kBucket);
   s3.region = options.s3_region;
   s3.key = options.s3_key;
   s3.secret = options.s3_secret;
-  return open_s3_blobs(s3, data);
+  return open_s3_blobs(s3, data, files);
 }
 
 Result<void> check_owner(const StoreOptions& options, JobStore& jobs, BlobStore& blobs) {

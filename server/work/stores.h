@@ -21,7 +21,8 @@ Result<void> check_addresses(const StoreOptions&);
 /// True when the address of the jobs holds a password.
 bool holds_password(const StoreOptions&);
 Result<std::unique_ptr<JobStore>> open_job_store(const StoreOptions&, const std::filesystem::path& data);
-Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions&, const std::filesystem::path& data);
+Result<std::unique_ptr<BlobStore>> open_blob_store(const StoreOptions&, const std::filesystem::path& data,
+                                                   FileLayer& files = real_files());
 /// "blobs_of_another" when a place that may be shared belongs to another job store, which would lose its blobs here.
 Result<void> check_owner(const StoreOptions&, JobStore&, BlobStore&);
 

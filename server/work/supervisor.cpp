@@ -87,7 +87,7 @@ void Supervisor::run(const Claim& claim) {
   const auto job = place_.store.get(claim.ref.job_id);
   if (job && job->cancel_requested) signal->ask(StopReason::cancel);
   ++place_.counters.claimed;
-  place_.counters.claim_latency_ms += claim.job.started_ms - claim.job.created_ms;
+  place_.counters.claim_latency.add(static_cast<double>(claim.job.started_ms - claim.job.created_ms) / 1000);
   place_.bus.announce();
   try {
     run_job(claim, *signal, place_);

@@ -90,6 +90,16 @@ Result<std::unique_ptr<EventStream>> TenantService::subscribe(const std::string&
   return std::make_unique<TenantStream>(std::move(all), all_, tenant_);
 }
 
+Result<std::vector<JobEvent>> TenantService::history(const std::string& id) {
+  KILN_TRY(job, get(id));
+  return all_.history(job.id);
+}
+
+Result<Job> TenantService::pin(const std::string& id, bool pinned) {
+  KILN_TRY(job, get(id));
+  return all_.pin(job.id, pinned);
+}
+
 Result<OpenArtifact> TenantService::open_artifact(const std::string& id, const std::string& name) {
   KILN_TRY(job, get(id));
   return all_.open_artifact(job.id, name);
@@ -99,6 +109,18 @@ Result<std::unique_ptr<AssetUpload>> TenantService::put_asset(const AssetRequest
   AssetRequest own = request;
   own.tenant = tenant_;
   return all_.put_asset(own);
+}
+
+Result<PartialUpload> TenantService::begin_upload(const PartialUpload& wanted) {
+  PartialUpload own = wanted;
+  own.tenant = tenant_;
+  return all_.begin_upload(own);
+}
+
+Result<std::unique_ptr<UploadPiece>> TenantService::append_upload(const PartialUpload& upload, std::uint64_t offset) {
+  PartialUpload own = upload;
+  own.tenant = tenant_;
+  return all_.append_upload(own, offset);
 }
 
 bool TenantService::has_asset(const std::string& sha256, const std::optional<std::string>&) {

@@ -27,11 +27,30 @@ class TenantService final : public Service {
   Result<Job> wait_done(const std::string& id, Millis timeout) override;
   Result<std::unique_ptr<EventStream>> subscribe(const std::string& job_id,
                                                  std::optional<std::uint64_t> after) override;
+  Result<std::vector<JobEvent>> history(const std::string& id) override;
+  Result<Job> pin(const std::string& id, bool pinned) override;
+  Result<void> pin_asset(const std::string& sha256, const std::string&, bool pinned) override {
+    return all_.pin_asset(sha256, tenant_, pinned);
+  }
+  Result<void> charge_upload(const std::string&, std::uint64_t bytes, std::uint64_t limit) override {
+    return all_.charge_upload(tenant_, bytes, limit);
+  }
+  Result<void> refund_upload(const std::string&, std::uint64_t bytes) override {
+    return all_.refund_upload(tenant_, bytes);
+  }
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
   std::uint64_t asset_offset(const std::string& sha256) override { return all_.asset_offset(sha256); }
   Result<BlobReader> open_asset(const std::string& sha256) override;
+  Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
+  Result<PartialUpload> find_upload(const std::string& id, const std::string&) override {
+    return all_.find_upload(id, tenant_);
+  }
+  Result<std::unique_ptr<UploadPiece>> append_upload(const PartialUpload& upload, std::uint64_t offset) override;
+  Result<void> remove_upload(const std::string& id, const std::string&) override {
+    return all_.remove_upload(id, tenant_);
+  }
 
  private:
   Submission of_this_tenant(Submission) const;

@@ -84,6 +84,20 @@ test('a job’s name is text, whatever it contains', () =>
     assert.equal(await page.evaluate(() => document.querySelectorAll('.card h3 *').length), 0);
   }));
 
+test('the history of a job tells why it ran twice, as text', () =>
+  withGallery(async (page) => {
+    await card(page, 'canceled').locator('summary', { hasText: 'History' }).click();
+    await until(page, (id) => document.querySelectorAll(`[data-job="${id}"] .history li`).length === 6, jobId('canceled'));
+    const lines = await card(page, 'canceled').locator('.history li').allInnerTexts();
+    const said = lines.map((text) => text.replace(/^\S+( [AP]M)? /, ''));
+    assert.equal(said[1], 'Running: attempt 1');
+    assert.ok(said[2].startsWith('Back in the queue: its lease ended without a word of its server <img'), said[2]);
+    assert.equal(said[3], 'Running: attempt 2');
+    assert.equal(said[4], 'cancellation requested');
+    assert.equal(said[5], 'Canceled');
+    assert.equal(await page.evaluate(() => window.hacked), undefined);
+  }));
+
 test('filters by status and label hide the others and say when none is left', () =>
   withGallery(async (page) => {
     const shown = () => page.$$eval('.card:not([hidden])', (cards) => cards.length);

@@ -79,13 +79,30 @@ function firstJobs() {
         where: 'broken.glb: /meshes/3/primitives/0/indices element 812',
       },
     }),
-    makeJob(3, 'too large', 'canceled'),
+    makeJob(3, 'too large', 'canceled', { attempt: 2 }),
     makeJob(4, 'knot over floor', 'succeeded'),
     makeJob(5, 'dungeon', 'queued'),
     makeJob(6, 'hotel room', 'running'),
   ];
   return new Map(jobs.map((job) => [job.id, job]));
 }
+
+/// A job that ran twice, and why; every other one has only begun.
+const history = (job) => {
+  const event = (status, message, kind = 'state') => ({ kind, status, message });
+  const ran =
+    job.attempt < 2
+      ? []
+      : [
+          event('running', 'attempt 1'),
+          event('queued', `its lease ended without a word of its server ${kHostileLabel}`),
+          event('running', 'attempt 2'),
+          event('running', 'cancellation requested', 'log'),
+          event(job.status, ''),
+          event(job.status, '', 'done'),
+        ];
+  return [event('queued', ''), ...ran].map((e, id) => ({ id, at: job.created_at, ...e }));
+};
 
 const kOpenApi = {
   openapi: '3.1.0',
@@ -200,6 +217,8 @@ export async function startMock({ port = 0, files = {} } = {}) {
     } else if (request.method === 'DELETE') {
       jobs.delete(id);
       response.writeHead(204).end();
+    } else if (rest === 'history') {
+      json(response, 200, { job: id, events: history(jobs.get(id)) });
     } else if (rest === 'cancel') {
       json(response, 202, change(id, { status: 'canceled', progress: null }));
     } else if (rest === 'artifacts' && files[name]) {

@@ -26,6 +26,18 @@ after(async () => {
 const withViewer = (hash, act, options) =>
   withReady(browser, `${mock.url}${kView}${hash ? `#${hash}` : ''}`, act, options);
 
+test('the page of a job has its history, also where there is nothing to show', async () => {
+  for (const [name, lines] of [
+    ['done', 1],
+    ['canceled', 6],
+  ]) {
+    const page = await openPage(browser, `${mock.url}/view/${jobId(name)}`);
+    await page.locator('summary', { hasText: 'History' }).click();
+    await until(page, (n) => document.querySelectorAll('.history li').length === n, lines);
+    await page.context().close();
+  }
+});
+
 /// The untextured part, and its vertex that faces the camera most squarely.
 const kPart = baked.parts.findIndex(
   (_part, i) =>

@@ -91,7 +91,11 @@ TEST_F(Service, AJobIsSubmittedWatchedFetchedAndForgotten) {
   EXPECT_FALSE(folder.read("got/report.json").empty());
   EXPECT_EQ(folder.read("got/scene.glb"), "");
   EXPECT_EQ(at_server({"open", id}).out, daemon->url() + "/view/" + id + "\n");
+  EXPECT_EQ(at_server({"pin", id}).out, id + "\n");
+  EXPECT_NE(at_server({"rm", id}).err.find("pinned"), std::string::npos);
+  EXPECT_EQ(at_server({"pin", "--off", id}).exit, 0);
   EXPECT_EQ(at_server({"rm", id}).exit, 0);
+  EXPECT_EQ(at_server({"pin", id}).exit, 5);
   EXPECT_EQ(at_server({"get", id}).exit, 5);
 }
 

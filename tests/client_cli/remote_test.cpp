@@ -66,8 +66,10 @@ class Remote : public ::testing::Test {
   bool never_ends = false;  // the stream stays open
   bool known = false;       // HEAD of an asset finds it
   std::size_t already = 0;  // bytes of the scene that an earlier upload left
+  bool speaks_tus = true;   // begins uploads in pieces, and has forgotten them by the next request
+  std::string sent_file = "plane.gltf";
 
-  std::atomic<int> uploads{0}, streams{0}, downloads{0}, cancels{0};
+  std::atomic<int> uploads{0}, begun{0}, streams{0}, downloads{0}, cancels{0};
   std::mutex mutex;
   std::string submitted, last_event_id, token, key;
   std::map<std::string, httplib::MultipartFormData> form;
@@ -84,9 +86,15 @@ class Remote : public ::testing::Test {
     });
     server.Put(R"(/v1/assets/(.*))", [this](const httplib::Request& request, auto& reply) {
       ++uploads;
-      const std::string whole = folder.read("plane.gltf").substr(0, already) + request.body;
+      const std::string whole = folder.read(sent_file).substr(0, already) + request.body;
       const bool placed = request.get_header_value("Upload-Offset") == std::to_string(already);
       reply.status = placed && request.matches[1] == hash_of(whole) ? 201 : 422;
+    });
+    server.Post("/v1/uploads", [this](const auto&, auto& reply) {
+      ++begun;
+      reply.status = speaks_tus ? 201 : 404;
+      reply.set_header("Location", "/v1/uploads/0123");
+      reply.set_header("Upload-Offset", "0");
     });
     server.Post("/v1/jobs", [this](const httplib::Request& request, auto& reply) { submit(request, reply); });
     server.Get("/v1/jobs", [this](const auto&, auto& reply) {
@@ -192,6 +200,19 @@ TEST_F(Remote, AnUploadGoesOnWhereItBroke) {
   const Ran ran = bake();
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_EQ(uploads, 1);
+}
+
+TEST_F(Remote, WhereUploadsInPiecesAreNotKeptALargeFileIsSentWhole) {
+  sent_file = "large.ply";
+  scene = folder.write(sent_file, "ply\n" + std::string(17 << 20, 'x'));
+  const Ran forgetful = run_kiln({"submit", scene, "--preset", "prt", "--server", url});
+  EXPECT_EQ(forgetful.exit, 0) << forgetful.err;
+  EXPECT_EQ(begun, 2) << "a balancer may have led to two servers";
+  EXPECT_EQ(uploads, 1);
+  speaks_tus = false;
+  const Ran old = run_kiln({"submit", scene, "--preset", "prt", "--server", url});
+  EXPECT_EQ(old.exit, 0) << old.err;
+  EXPECT_EQ(uploads, 2);
 }
 
 TEST_F(Remote, AnEnvironmentFileTravelsWithItsName) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "core/base/sha256.h"
 #include "tests/faults/daemon.h"
@@ -153,6 +154,52 @@ TEST_F(KilndTest, ScrubFindsAFlippedBitAndGcTakesWhatNobodyNeeds) {
   EXPECT_EQ(json::parse(refuse("admin gc").text)["removed"], 0) << "its grace is not over";
   EXPECT_EQ(json::parse(refuse("admin gc --blob-grace-s 0").text)["removed"], 1);
   EXPECT_EQ(json::parse(refuse("admin stats").text)["blobs"], 0);
+}
+
+TEST_F(KilndTest, AJobGoesWhenItsTimeIsOverAndAPinnedOneStays) {
+  const std::string cube = cube_glb();
+  std::string pinned, other;
+  {
+    const auto daemon = start({"--workers", "0", "--keep-days", "0.00001", "--blob-grace-s", "1"});
+    const int port = daemon->port();
+    ASSERT_EQ(http_put(port, "/v1/assets/" + sha256_of(cube), cube).status, 201);
+    const auto canceled = [&](int seed, bool pin) {
+      const std::string id = json::parse(http_post(port, "/v1/jobs", cube_job(sha256_of(cube), seed)).body)["id"];
+      EXPECT_TRUE(!pin || http_put(port, "/v1/jobs/" + id + "/pin", "").status == 200);
+      EXPECT_EQ(http_post(port, "/v1/jobs/" + id + "/cancel", "").status, 200);
+      return id;
+    };
+    pinned = canceled(1, true);
+    other = canceled(2, false);
+    for (int i = 0; i < 200 && http_get(port, "/v1/jobs/" + other).status == 200; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(http_get(port, "/v1/jobs/" + other).status, 404);
+    EXPECT_EQ(http_get(port, "/v1/jobs/" + pinned).status, 200);
+    EXPECT_EQ(http_get(port, "/v1/assets/" + sha256_of(cube)).status, 200) << "its scene stays with it";
+  }
+  const std::string rules = " --keep-days 0.00001 --blob-grace-s 0";
+  EXPECT_EQ(json::parse(refuse("admin gc" + rules).text)["forgotten"], 0);
+  EXPECT_EQ(refuse("admin unpin " + pinned).code, 0);
+  EXPECT_EQ(json::parse(refuse("admin gc --dry-run" + rules).text)["forgotten"], 1);
+  EXPECT_EQ(json::parse(refuse("admin stats").text)["jobs"]["canceled"], 1) << "it was only counted";
+  EXPECT_EQ(refuse("admin pin " + sha256_of(cube)).code, 0);
+  const json gone = json::parse(refuse("admin gc" + rules).text);
+  EXPECT_EQ(gone["forgotten"], 1);
+  EXPECT_EQ(gone["removed"], 0) << "the scene is pinned by itself";
+  EXPECT_EQ(refuse("admin unpin " + sha256_of(cube)).code, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(json::parse(refuse("admin gc" + rules).text)["removed"], 1);
+  EXPECT_EQ(refuse("admin pin " + pinned).code, 1);
+  EXPECT_EQ(refuse("admin pin").code, 2);
+}
+
+TEST_F(KilndTest, OriginsAndProxiesThatMeanNothingAreRefused) {
+  for (const char* flag : {"--cors-origin '*'", "--cors-origin https://a.example/", "--trusted-proxy proxy.example",
+                           "--trusted-proxy 10.0.0.0/40"}) {
+    const End end = refuse(flag);
+    EXPECT_EQ(end.code, 78) << flag;
+    EXPECT_EQ(std::ranges::count(end.text, '\n'), 1) << end.text;
+  }
 }
 
 TEST_F(KilndTest, AnUnknownFlagIsAUsageError) {

@@ -1,8 +1,11 @@
 // Attacks on the importer; the rows of reliability.md 3.2 that concern files. Each is answered with a typed fault in
 // under 5 seconds and 200 MB, without a word of the machine or of a library.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "tests/core/artifact/gltf_samples.h"
@@ -250,6 +253,22 @@ TEST(ImportHostile, G11ContainersThatLieAreRefused) {
   expect_fault(Bytes{}, "empty_file");
   expect_fault(Bytes{'g', 'l', 'T', 'F'}, "glb_truncated");
   expect_fault(std::string("PK\3\4 an archive"), "unknown_format");
+}
+
+TEST(ImportHostile, G12AFileOf4GiBIsRefusedUnread) {
+  const auto path = std::filesystem::temp_directory_path() / ("kiln_large." + std::to_string(::getpid()));
+  std::ofstream(path) << "glTF";
+  std::filesystem::resize_file(path, 1ULL << 32);  // sparse: takes no room
+  const auto file = FileBytes::map(path, "scene.glb");
+  std::filesystem::remove(path);
+  ASSERT_TRUE(file);
+  reset_peak_memory();
+  const std::uint64_t before = peak_memory_bytes();
+  const auto scene = import_scene({"scene.glb", *file, {}});
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, "file_too_large");
+  EXPECT_LT(peak_memory_bytes(), before + (200u << 20));
+  expect_clean_text(scene.error());
 }
 
 TEST(ImportHostile, G13NumbersThatAreNoneAreRefused) {

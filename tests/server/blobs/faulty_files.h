@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -41,7 +40,9 @@ class FaultyFiles : public FileLayer {
   }
   ssize_t write(int fd, const void* data, std::size_t size) override {
     return step<ssize_t>("write", true, [&] {
-      unsynced_bytes_.insert(paths_[fd]);
+      const std::string& path = paths_[fd];
+      std::error_code none;
+      if (!unsynced_bytes_.contains(path)) unsynced_bytes_[path] = std::filesystem::file_size(path, none);
       return FileLayer::write(fd, data, short_writes && size > 1 ? size / 2 : size);
     });
   }
@@ -60,7 +61,8 @@ class FaultyFiles : public FileLayer {
     });
   }
   int close(int fd) override {
-    if (dead_) return ::close(fd);  // the kernel does it for the dead
+    if (dead_) return ::close(fd);      // the kernel does it for the dead
+    if (calls == fail_at) ::close(fd);  // a close that fails has closed all the same (close(2))
     return step<int>("close", false, [&] { return FileLayer::close(fd); });
   }
   int rename(const std::string& from, const std::string& to) override {
@@ -68,7 +70,8 @@ class FaultyFiles : public FileLayer {
       const bool existed = std::filesystem::exists(to);
       const int done = FileLayer::rename(from, to);
       if (done == 0) {
-        if (unsynced_bytes_.erase(from) > 0) unsynced_bytes_.insert(to);
+        unsynced_bytes_.erase(to);
+        if (auto moved = unsynced_bytes_.extract(from); !moved.empty()) unsynced_bytes_[to] = moved.mapped();
         unsynced_entries_.push_back({to, from, existed});
       }
       return done;
@@ -85,14 +88,16 @@ class FaultyFiles : public FileLayer {
     });
   }
 
-  /// What a power cut leaves: names and bytes that were synced. Unsynced bytes are the worst there is: none.
+  /// What a power cut leaves: names and bytes that were synced. Of unsynced bytes none is left.
   void cut_power() {
     for (auto entry = unsynced_entries_.rbegin(); entry != unsynced_entries_.rend(); ++entry) {
       if (!entry->from.empty() && !entry->replaced) FileLayer::rename(entry->path, entry->from);
       if (entry->from.empty()) std::filesystem::remove_all(entry->path);
     }
-    for (const std::string& path : unsynced_bytes_) {
-      if (std::filesystem::exists(path)) std::filesystem::resize_file(path, 0);
+    for (const auto& [path, synced] : unsynced_bytes_) {
+      if (std::filesystem::exists(path) && std::filesystem::file_size(path) > synced) {
+        std::filesystem::resize_file(path, synced);
+      }
     }
   }
 
@@ -124,7 +129,7 @@ class FaultyFiles : public FileLayer {
 
   bool dead_ = false, interrupted_ = false;
   std::map<int, std::string> paths_;
-  std::set<std::string> unsynced_bytes_;
+  std::map<std::string, std::uintmax_t> unsynced_bytes_;  // path, and how many of its bytes were synced
   std::vector<Entry> unsynced_entries_;
 };
 

@@ -66,8 +66,16 @@ FakeService::FakeService() {
 }
 
 BlobStore& FakeService::blobs() {
-  std::call_once(blobs_once_, [this] { blobs_ = open_store(folder_); });
+  std::call_once(blobs_once_, [this] {
+    blobs_ = open_store(folder_);
+    desk_ = std::make_unique<UploadDesk>(*blobs_, [](const std::string&, const auto& store) { return store(); });
+  });
   return *blobs_;
+}
+
+UploadDesk& FakeService::desk() {
+  static_cast<void>(blobs());
+  return *desk_;
 }
 
 FakeService::~FakeService() {
@@ -214,6 +222,41 @@ Result<std::unique_ptr<EventStream>> FakeService::subscribe(const std::string& j
                                                             std::optional<std::uint64_t> after) {
   const std::lock_guard lock(mutex_);
   return std::unique_ptr<EventStream>(std::make_unique<FakeStream>(*this, job_id, after.value_or(events_.size())));
+}
+
+Result<std::vector<JobEvent>> FakeService::history(const std::string& id) {
+  KILN_TRY(job, get(id));
+  const std::lock_guard lock(mutex_);
+  std::vector<JobEvent> own;
+  for (const JobEvent& event : events_)
+    if (event.job_id == job.id) own.push_back(event);
+  return own;
+}
+
+Result<Job> FakeService::pin(const std::string& id, bool pinned) {
+  const std::lock_guard lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end()) return unknown_job();
+  found->second.pinned = pinned;
+  return found->second;
+}
+
+Result<void> FakeService::pin_asset(const std::string& sha256, const std::string&, bool) {
+  if (!blobs().exists(sha256)) return fault("not_found", "there is no such asset");
+  return {};
+}
+
+Result<void> FakeService::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
+  const std::lock_guard lock(mutex_);
+  if (limit > 0 && uploaded_[tenant] + bytes > limit) return fault("daily_quota", "that is enough for today");
+  uploaded_[tenant] += bytes;
+  return {};
+}
+
+Result<void> FakeService::refund_upload(const std::string& tenant, std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  uploaded_[tenant] -= bytes;
+  return {};
 }
 
 Result<OpenArtifact> FakeService::open_artifact(const std::string& id, const std::string& name) {

@@ -15,6 +15,7 @@ class Text : public BodySource {
  public:
   Text(std::string text, std::size_t piece) : text_(std::move(text)), piece_(piece) {}
   std::uint64_t length() const override { return text_.size(); }
+  std::uint64_t taken() const override { return at_; }
   Answer<std::size_t> read(std::span<std::uint8_t> out) override {
     const std::size_t count = std::min({piece_, out.size(), text_.size() - at_});
     std::copy_n(text_.data() + at_, count, out.data());

@@ -191,6 +191,39 @@ TEST(Jobs, CancelAndDeleteActOnceAndAreHarmlessAgain) {
   EXPECT_EQ(server.get("/v1/jobs/" + id).status, 404);
 }
 
+TEST(Jobs, ArePinnedAndUnpinned) {
+  RunningServer server;
+  const std::string id = server.make_job();
+  const auto pinned = [&](const char* method) {
+    RawReply reply = server.raw(request_text(method, "/v1/jobs/" + id + "/pin", {"Content-Length: 0"}));
+    EXPECT_EQ(reply.status, 200) << reply.all;
+    return parse_job(reply.body)->pinned;
+  };
+  EXPECT_FALSE(parse_job(server.get("/v1/jobs/" + id).body)->pinned);
+  EXPECT_TRUE(pinned("PUT"));
+  EXPECT_TRUE(parse_job(server.get("/v1/jobs/" + id).body)->pinned);
+  EXPECT_FALSE(pinned("DELETE"));
+  EXPECT_EQ(server.raw(request_text("PUT", "/v1/jobs/none/pin", {"Content-Length: 0"})).status, 404);
+}
+
+TEST(Jobs, TheHistoryTellsWhatHappenedInOrder) {
+  RunningServer server;
+  const std::string id = server.make_job();
+  server.service().say(id, EventKind::log, "a line");
+  server.service().succeed(id, {{"scene.glb", "x"}});
+  const json history = json::parse(server.get("/v1/jobs/" + id + "/history").body);
+  EXPECT_EQ(history["job"], id);
+  std::vector<std::string> kinds;
+  for (const json& event : history["events"]) kinds.push_back(event["kind"]);
+  ASSERT_GE(kinds.size(), 3U);
+  EXPECT_EQ(kinds[0], "state");
+  EXPECT_EQ(kinds[1], "log");
+  EXPECT_EQ(history["events"][1]["message"], "a line");
+  EXPECT_EQ(kinds.back(), "done");
+  EXPECT_EQ(history["events"].back()["status"], "succeeded");
+  EXPECT_EQ(server.get("/v1/jobs/none/history").status, 404);
+}
+
 TEST(Jobs, AFailedJobCarriesItsProblem) {
   RunningServer server;
   const std::string id = server.make_job();
@@ -251,6 +284,19 @@ TEST(Assets, AnInterruptedUploadGoesOnWhereItEnded) {
   EXPECT_EQ(wrong.fields.at("upload-offset"), "200000");
   EXPECT_EQ(server.raw(request_text("PUT", target, {"Upload-Offset: 200000"}, bytes.substr(offset))).status, 201);
   EXPECT_EQ(server.get(target).body, bytes);
+}
+
+TEST(Assets, ArePinnedAndUnpinned) {
+  RunningServer server;
+  const std::string asset = "/v1/assets/" + sha_of("kept");
+  const auto status = [&](const char* method, const std::string& path) {
+    return server.raw(request_text(method, path + "/pin", {"Content-Length: 0"})).status;
+  };
+  EXPECT_EQ(status("PUT", asset), 404);
+  ASSERT_EQ(server.raw(request_text("PUT", asset, {}, "kept")).status, 201);
+  EXPECT_EQ(status("PUT", asset), 204);
+  EXPECT_EQ(status("DELETE", asset), 204);
+  EXPECT_EQ(status("PUT", "/v1/assets/short"), 422);
 }
 
 TEST(Assets, MayComeInPiecesNamedByContentRange) {
@@ -376,7 +422,16 @@ TEST(Health, IsAliveWhileReadinessTellsEveryReason) {
 TEST(Metrics, AreReadablePrometheusText) {
   RunningServer server;
   server.get("/healthz");
+  server.get("/v1/jobs/none");
   RawReply reply = server.get("/metrics");
+  EXPECT_EQ(reply.fields["content-type"], "text/plain; version=0.0.4; charset=utf-8");
+  for (const char* sample : {"kiln_http_problems_total{code=\"not_found\"} 1\n", "kiln_sandbox{lock=\"files\"} ",
+                             "kiln_http_request_seconds_bucket{operation=\"health\",le=\"+Inf\"} 1\n",
+                             "# TYPE kiln_claim_latency_seconds histogram\n", "kiln_fsync_seconds_count ",
+                             "kiln_listen_drops_total ", "kiln_oldest_queued_seconds ", "kiln_attempts_total ",
+                             "kiln_stale_commits_total ", "kiln_worker_deaths_total{cause=\"memory\"} "}) {
+    EXPECT_NE(reply.body.find(sample), std::string::npos) << sample;
+  }
   EXPECT_NE(reply.body.find("kiln_http_requests_total{operation=\"health\",status=\"200\"} 1\n"), std::string::npos);
   EXPECT_NE(reply.body.find("# TYPE kiln_jobs gauge\n"), std::string::npos);
   for (std::size_t at = 0; at < reply.body.size();) {  // every line is a comment or "name{labels} number"

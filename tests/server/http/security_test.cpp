@@ -1,4 +1,4 @@
-// reliability.md 3.4: S3, S6-S9, S12.
+// reliability.md 3.4: S2-S4, S6-S10, S12.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,6 +8,7 @@
 
 #include "core/base/sha256.h"
 #include "server/api/problem.h"
+#include "server/http/cors.h"
 #include "server/http/visitors.h"
 #include "tests/server/http/raw_client.h"
 
@@ -75,17 +76,23 @@ TEST(Security, S2AWordBehindATokenThatMeansNothingIsRefused) {
     std::ofstream(file) << token << ' ' << words << '\n';
     return read_tokens(file);
   };
-  const auto good = read("tenant=studio-a scopes=read jobs=5 uploads=2 rate=0.5");
+  const auto good = read("tenant=studio-a scopes=read jobs=5 uploads=2 rate=0.5 daily_mb=2 keep_days=30");
   ASSERT_TRUE(good);
   EXPECT_EQ(good->front().tenant, "studio-a");
   EXPECT_TRUE(good->front().read);
   EXPECT_FALSE(good->front().submit || good->front().admin);
   EXPECT_EQ(good->front().max_jobs, 5);
   EXPECT_EQ(good->front().rate, 0.5);
+  EXPECT_EQ(good->front().max_daily_bytes, 2U << 20);
+  EXPECT_EQ(kept_by_tenant(*good).at("studio-a"), std::chrono::hours(30 * 24));
+  EXPECT_FALSE(read("tenant=a keep_days=1\n" + token + " tenant=a keep_days=2")) << "which of the two?";
+  EXPECT_EQ(read("tenant=a keep_days=1\n" + token + " tenant=b keep_days=2")->size(), 2U);
   EXPECT_FALSE(read("tenant=a")->front().admin) << "a tenant does not see the others";
   EXPECT_TRUE(read("")->front().admin);
-  for (const char* words : {"tenant=", "tenant=a/b", "scopes=", "scopes=write", "scopes=read,", "jobs=0", "jobs=-1",
-                            "jobs=x", "rate=1x", "colour=red", "tenant", "tenant=a scopes=admin", "jobs=3"}) {
+  for (const char* words :
+       {"tenant=", "tenant=a/b", "scopes=", "scopes=write", "scopes=read,", "jobs=0", "jobs=-1", "jobs=x", "rate=1x",
+        "colour=red", "tenant", "tenant=a scopes=admin", "jobs=3", "keep_days=3", "tenant=a keep_days=0", "daily_mb=5",
+        "tenant=a daily_mb=0", "tenant=a daily_mb=-1", "tenant=a keep_days=99999"}) {
     EXPECT_FALSE(read(words)) << words;
   }
 }
@@ -167,6 +174,138 @@ TEST(Security, S6NoOriginIsEverAllowed) {
             404);
 }
 
+TEST(Security, S6AListedOriginAndNoOtherMayReadAndChange) {
+  HttpOptions options = few_threads();
+  options.origins = {"https://studio.example", "http://localhost:5173"};
+  RunningServer server(options);
+  const auto allowed = [&](const std::string& origin) {
+    RawReply reply = server.get("/v1/jobs", {"Origin: " + origin});
+    EXPECT_EQ(reply.fields["vary"], "Origin");
+    EXPECT_EQ(reply.fields.count("access-control-allow-credentials"), 0U);
+    return reply.fields.contains("access-control-allow-origin") ? reply.fields["access-control-allow-origin"] : "";
+  };
+  EXPECT_EQ(allowed("https://studio.example"), "https://studio.example");
+  EXPECT_EQ(allowed("http://localhost:5173"), "http://localhost:5173");
+  for (const char* origin :
+       {"null", "*", "https://evil.com", "https://studio.example.evil.com", "https://studio.example:8",
+        "http://studio.example", "https://STUDIO.example", "https://studio.example, null"}) {
+    EXPECT_EQ(allowed(origin), "") << origin;
+  }
+  EXPECT_EQ(server.get("/v1/jobs").fields["vary"], "Origin") << "caches have to know without an Origin too";
+  EXPECT_EQ(server.get("/v1/jobs", {"Origin: https://studio.example", "Origin: null"})
+                .fields.count("access-control-allow-origin"),
+            0U);
+  const auto cancel = [&](const std::string& origin) {
+    return server.raw(request_text("POST", "/v1/jobs/x/cancel", {"Origin: " + origin, "Sec-Fetch-Site: cross-site"}));
+  };
+  EXPECT_EQ(cancel("https://studio.example").status, 404);
+  EXPECT_EQ(cancel("https://evil.com").status, 403);
+}
+
+TEST(Security, S6ABrowserMayAskFirstAndNeedsNoTokenForThat) {
+  HttpOptions options = few_threads();
+  options.origins = {"https://studio.example"};
+  options.tokens = {access(std::string(43, 't'))};
+  RunningServer server(options);
+  const auto ask = [&](const std::string& origin, const std::string& path) {
+    return server.raw(request_text("OPTIONS", path, {"Origin: " + origin, "Access-Control-Request-Method: PATCH"}));
+  };
+  RawReply reply = ask("https://studio.example", "/v1/uploads/x");
+  EXPECT_EQ(reply.status, 204) << reply.all;
+  EXPECT_EQ(reply.fields["access-control-allow-origin"], "https://studio.example");
+  EXPECT_NE(reply.fields["access-control-allow-methods"].find("PATCH"), std::string::npos);
+  EXPECT_NE(reply.fields["access-control-allow-headers"].find("authorization"), std::string::npos);
+  EXPECT_EQ(ask("https://studio.example", "/v1/uploads").fields["access-control-allow-methods"], "POST, OPTIONS");
+  RawReply stranger = ask("https://evil.com", "/v1/uploads/x");
+  EXPECT_EQ(stranger.status, 401);
+  EXPECT_EQ(stranger.fields.count("access-control-allow-origin"), 0U);
+  RawReply real = server.get("/v1/jobs", {"Origin: https://studio.example"});
+  EXPECT_EQ(real.status, 401) << "the request itself does";
+  EXPECT_EQ(real.fields["access-control-allow-origin"], "https://studio.example") << "and its page may read why";
+}
+
+TEST(Security, S6AnOriginIsOneAsBrowsersWriteIt) {
+  for (const char* good : {"https://a.example", "http://localhost:5173", "http://[::1]:80"})
+    EXPECT_TRUE(is_origin(good));
+  for (const char* bad :
+       {"", "*", "null", "a.example", "https://", "https://a.example/", "https://A.example", "ftp://a"})
+    EXPECT_FALSE(is_origin(bad)) << bad;
+}
+
+TEST(Security, S4ATokenUploadsSoManyBytesADayAndAnotherIsUnaffected) {
+  const std::string small(43, 's'), large(43, 'l');
+  HttpOptions options = few_threads();
+  for (const auto& [token, tenant] : {std::pair{small, "small"}, std::pair{large, "large"}}) {
+    options.tokens.push_back(access(token));
+    options.tokens.back().tenant = tenant;
+    options.tokens.back().admin = false;
+  }
+  options.tokens[0].max_daily_bytes = 1000;
+  RunningServer server(options);
+  const auto put = [&](const std::string& token, const std::string& text) {
+    return server.raw(request_text("POST", "/v1/assets", {"Authorization: Bearer " + token}, text));
+  };
+  EXPECT_EQ(put(small, std::string(600, 'a')).status, 201);
+  RawReply refused = put(small, std::string(401, 'b'));
+  EXPECT_EQ(refused.status, 429);
+  EXPECT_EQ(parse_problem(refused.body)->code, "daily_quota");
+  const int wait = std::stoi(refused.fields["retry-after"]);
+  EXPECT_TRUE(wait > 0 && wait <= 24 * 3600) << wait;
+  EXPECT_EQ(put(large, std::string(5000, 'b')).status, 201);
+  EXPECT_EQ(put(small, std::string(400, 'b')).status, 201) << "what was refused is not counted";
+  EXPECT_EQ(put(small, "c").status, 429);
+}
+
+TEST(Security, S4BytesThatDidNotComeAreNotCounted) {
+  const std::string token(43, 's');
+  HttpOptions options = few_threads();
+  options.tokens = {access(token)};
+  options.tokens[0].admin = false;
+  options.tokens[0].max_daily_bytes = 1000;
+  RunningServer server(options);
+  {
+    RawConnection cut(server.port());
+    cut.send("POST /v1/assets HTTP/1.1\r\nHost: h\r\nAuthorization: Bearer " + token +
+             "\r\nContent-Length: 1000\r\n\r\n" + std::string(300, 'x'));
+    cut.shut();
+    EXPECT_EQ(cut.read_reply().status, 400);
+  }
+  const auto put = [&](std::size_t bytes) {
+    return server.raw(request_text("POST", "/v1/assets", {"Authorization: Bearer " + token}, std::string(bytes, 'y')));
+  };
+  EXPECT_EQ(put(701).status, 429);
+  EXPECT_EQ(put(700).status, 201);
+}
+
+TEST(Security, S10ForwardedAddressesAreBelievedFromListedProxiesAlone) {
+  const auto peer_of = [](const std::vector<std::string>& proxies, const std::vector<std::string>& fields) {
+    HttpOptions options = few_threads();
+    options.proxies = AddressList::of(proxies).value();
+    RunningServer server(options);
+    server.get("/healthz", fields);
+    return json::parse(server.log().at(0))["peer"].get<std::string>();
+  };
+  EXPECT_EQ(peer_of({}, {"X-Forwarded-For: 6.6.6.6"}), "127.0.0.1") << "spoofed";
+  EXPECT_EQ(peer_of({"10.0.0.0/8"}, {"X-Forwarded-For: 6.6.6.6"}), "127.0.0.1");
+  EXPECT_EQ(peer_of({"127.0.0.1"}, {"X-Forwarded-For: 203.0.113.9"}), "203.0.113.9");
+  EXPECT_EQ(peer_of({"127.0.0.1"}, {}), "127.0.0.1");
+  EXPECT_EQ(peer_of({"127.0.0.1"}, {"X-Forwarded-For: 6.6.6.6", "X-Forwarded-For: 7.7.7.7"}), "127.0.0.1");
+}
+
+TEST(Security, S10TheLastAddressThatIsNoProxyIsTheClients) {
+  const AddressList proxies = AddressList::of({"127.0.0.1", "10.0.0.0/8", "fd00::/8"}).value();
+  EXPECT_EQ(client_address("10.1.2.3", "6.6.6.6, 203.0.113.9, 10.9.9.9", proxies), "203.0.113.9");
+  EXPECT_EQ(client_address("10.1.2.3", "10.4.4.4", proxies), "10.4.4.4") << "nobody else is named";
+  EXPECT_EQ(client_address("fd12::1", "2001:db8::5", proxies), "2001:db8::5");
+  EXPECT_EQ(client_address("11.1.2.3", "6.6.6.6", proxies), "11.1.2.3");
+  EXPECT_EQ(client_address("10.1.2.3", "6.6.6.6, unknown", proxies), "10.1.2.3");
+  EXPECT_EQ(client_address("10.1.2.3", "\"}{\n", proxies), "10.1.2.3");
+  for (const char* bad : {"", "localhost", "10.0.0.0/33", "10.0.0.0/", "fd00::/129", "10.0.0/8", "1.2.3.4/-1"})
+    EXPECT_EQ(AddressList::of({bad}).error().code, "bad_address") << bad;
+  EXPECT_TRUE(AddressList::of({"0.0.0.0/0"})->holds("198.51.100.7"));
+  EXPECT_FALSE(AddressList::of({"0.0.0.0/0"})->holds("2001:db8::5")) << "another family";
+}
+
 TEST(Security, ANameThatIsNotOursIsMisdirectedWhenNamesAreGiven) {
   HttpOptions options = few_threads();
   options.hosts = loopback_hosts();
@@ -245,6 +384,14 @@ TEST(Security, S12ProblemsHaveACodeARequestIdAndNoInnards) {
       request_text("PUT", "/v1/jobs?preset=nope", {}, "x"),
       request_text("PUT", "/v1/assets/zz", {}, "x"),
       request_text("PUT", "/v1/assets/" + kSha, {"Upload-Offset: 7"}, "x"),
+      request_text("PUT", "/v1/assets/" + kSha + "/pin", {"Content-Length: 0"}),
+      request_text("PUT", "/v1/jobs/..%2f..%2fetc%2fpasswd/pin", {"Content-Length: 0"}),
+      request_text("GET", "/v1/uploads/..%2f..%2fkiln.db"),
+      request_text("DELETE", "/v1/uploads/" + kSha, {"Tus-Resumable: 1.0.0"}),
+      request_text("POST", "/v1/uploads", {"Content-Length: 0"}),
+      request_text("POST", "/v1/uploads", {"Tus-Resumable: 1.0.0", "Upload-Length: x", "Content-Length: 0"}),
+      request_text("POST", "/v1/uploads",
+                   {"Tus-Resumable: 1.0.0", "Upload-Length: 9", "Upload-Metadata: ,,", "Content-Length: 0"}),
   };
   for (const std::string& text : requests) {
     SCOPED_TRACE(text.substr(0, 200));

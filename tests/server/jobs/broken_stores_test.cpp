@@ -22,7 +22,9 @@ enum class Flaw {
   events_repeat,     // positions are not looked at
   open_gate,         // nobody is ever alone at the blob gate
   open_doors,        // a tenant sees the blobs of others
-  deaf_cancels       // a running job is not told that it was canceled
+  deaf_cancels,      // a running job is not told that it was canceled
+  loose_pins,        // what is pinned goes all the same
+  free_uploads       // nobody counts what comes
 };
 
 /// SQLite, with one flaw on top.
@@ -78,8 +80,23 @@ class BrokenStore final : public JobStore {
   Result<bool> knows_blob(const std::string& sha, const std::optional<std::string>& tenant) override {
     return store_->knows_blob(sha, flaw_ == Flaw::open_doors ? std::nullopt : tenant);
   }
-  Result<std::vector<std::string>> forget_unused_blobs(Millis grace) override {
-    return store_->forget_unused_blobs(grace);
+  Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count) override {
+    return store_->forget_unused_blobs(grace, only_count);
+  }
+  Result<Job> pin(const std::string& id, bool pinned) override {
+    return store_->pin(id, pinned && flaw_ != Flaw::loose_pins);
+  }
+  Result<int> forget_old_jobs(const Retention& retention, bool only_count) override {
+    return store_->forget_old_jobs(retention, only_count);
+  }
+  Result<void> pin_blob(const std::string& sha, const std::string& tenant, bool pinned) override {
+    return store_->pin_blob(sha, tenant, pinned);
+  }
+  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
+    return store_->charge_upload(tenant, bytes, flaw_ == Flaw::free_uploads ? 0 : limit);
+  }
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override {
+    return store_->refund_upload(tenant, bytes);
   }
   Result<std::unique_ptr<BlobGate>> enter_blob_gate() override { return store_->enter_blob_gate(); }
   Result<std::unique_ptr<BlobGate>> close_blob_gate() override {
@@ -114,7 +131,9 @@ std::vector<Engine> engines() {
           broken("events_repeat", Flaw::events_repeat),
           broken("open_gate", Flaw::open_gate),
           broken("open_doors", Flaw::open_doors),
-          broken("deaf_cancels", Flaw::deaf_cancels)};
+          broken("deaf_cancels", Flaw::deaf_cancels),
+          broken("loose_pins", Flaw::loose_pins),
+          broken("free_uploads", Flaw::free_uploads)};
 }
 
 /// Counts what fails for each engine, and says nothing itself.

@@ -214,6 +214,17 @@ TEST_F(PostgresStoreTest, AServerThatMayForgetIsRefused) {
   EXPECT_EQ(opened.error().code, "store_unsafe");
 }
 
+TEST_F(PostgresStoreTest, ASchemaOfVersionOneIsBroughtToTheNextWithAllItHolds) {
+  const std::string id = store_->create(new_job(1)).value().job.id;
+  ASSERT_TRUE(server().run("DROP TABLE kiln.upload_day"));
+  ASSERT_TRUE(server().run("ALTER TABLE kiln.job DROP COLUMN pinned"));
+  ASSERT_TRUE(server().run("ALTER TABLE kiln.blob_tenant DROP COLUMN pinned"));
+  ASSERT_TRUE(server().run("UPDATE kiln.meta SET version=1"));
+  const auto store = open_postgres_store({server().address(), {}}).value();
+  EXPECT_TRUE(store->pin(id, true)->pinned);
+  EXPECT_TRUE(store->charge_upload("studio", 1, 1));
+}
+
 TEST_F(PostgresStoreTest, ASchemaOfANewerProgramIsRefused) {
   ASSERT_TRUE(server().run("UPDATE kiln.meta SET version=999"));
   EXPECT_EQ(open_postgres_store({server().address(), {}}).error().code, "schema_too_new");

@@ -67,7 +67,8 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
     id = finished_job(*store).id;
   }
   // Back to how version 1 was.
-  ASSERT_EQ(run("DROP TABLE blob_tenant; DROP TABLE identity; DROP INDEX job_by_tenant; DROP INDEX job_running;"
+  ASSERT_EQ(run("DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned;"
+                "DROP TABLE blob_tenant; DROP TABLE identity; DROP INDEX job_by_tenant; DROP INDEX job_running;"
                 "ALTER TABLE job DROP COLUMN tenant; CREATE INDEX job_running ON job(id) WHERE state='running';"
                 "PRAGMA user_version=1"),
             SQLITE_OK);
@@ -75,6 +76,21 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
   EXPECT_EQ(store->get(id)->state, JobState::canceled);
   EXPECT_EQ(store->get(id)->tenant, "");
   EXPECT_TRUE(store->knows_blob(std::string(64, 'a'), "").value());
+}
+
+TEST_F(SqliteStoreTest, ADatabaseOfVersionTwoIsBroughtToTheNextWithAllItHolds) {
+  std::string id;
+  {
+    const auto store = open_sqlite_store({file(), {}}).value();
+    id = finished_job(*store).id;
+  }
+  ASSERT_EQ(run("DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned; ALTER TABLE blob_tenant DROP COLUMN pinned;"
+                "PRAGMA user_version=2"),
+            SQLITE_OK);
+  const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_FALSE(store->get(id)->pinned);
+  EXPECT_TRUE(store->pin(id, true)->pinned);
+  EXPECT_TRUE(store->pin_blob(std::string(64, 'a'), "", true));
 }
 
 TEST_F(SqliteStoreTest, AFileThatIsNoDatabaseIsRefused) {

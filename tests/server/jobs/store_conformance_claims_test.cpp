@@ -73,6 +73,29 @@ TEST_P(StoreClaims, AnEndedLeaseIsReapedAndTheOldWorkerIsFencedOff) {
   EXPECT_EQ(store().get(id)->artifacts[0].name, "scene.glb");
 }
 
+TEST_P(StoreClaims, TheStoryTellsWhyAJobRanMoreThanOnce) {
+  const std::string id = create().id;
+  claim();
+  clock_.now_ms += kTestLease.count() + 1;
+  ASSERT_EQ(store().reap().value(), 1);
+  store().retry(claim().ref, {"its worker was ended by signal 9", true, Millis(0)}).value();
+  claim();
+  ASSERT_EQ(store().reap(true).value(), 1);
+  store().release(claim().ref).value();
+  store().commit(claim().ref, std::vector{artifact()}, false).value();
+  std::vector<std::string> told;
+  const auto story = store().events_after(0, id, 100).value();
+  for (const JobEvent& event : story) {
+    if (event.kind == EventKind::state) told.push_back(std::string(to_string(event.state)) + ": " + event.message);
+  }
+  EXPECT_EQ(told, (std::vector<std::string>{
+                      "queued: ", "running: attempt 1", "queued: its lease ended without a word of its server",
+                      "running: attempt 2", "queued: its worker was ended by signal 9", "running: attempt 3",
+                      "queued: its server ended before it was done", "running: attempt 4",
+                      "queued: the server stops; the job goes on after its next start", "running: attempt 4",
+                      "succeeded: "}));
+}
+
 TEST_P(StoreClaims, TheRightTokenWithAWrongFenceIsFencedOffToo) {
   create();
   ClaimRef forged = claim().ref;

@@ -45,6 +45,15 @@ export interface Job {
   artifacts: Artifact[];
 }
 
+/// One thing that happened to a job.
+export interface JobEvent {
+  id: number;
+  at: string;
+  kind: 'state' | 'log' | 'artifact' | 'done';
+  status: Status; // after it
+  message: string;
+}
+
 export interface Preset {
   name: string;
   description: string;
@@ -94,6 +103,8 @@ export function listJobs(query: { status?: string; label?: string; cursor?: stri
 }
 
 export const getJob = (id: string): Promise<Job> => request('GET', path(id)) as Promise<Job>;
+export const getHistory = async (id: string): Promise<JobEvent[]> =>
+  ((await request('GET', `${path(id)}/history`)) as { events: JobEvent[] }).events;
 export const cancelJob = (id: string): Promise<unknown> => request('POST', `${path(id)}/cancel`);
 export const deleteJob = (id: string): Promise<unknown> => request('DELETE', path(id));
 export const getReport = (job: Job): Promise<Report> =>

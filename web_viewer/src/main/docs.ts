@@ -43,7 +43,7 @@ interface Document {
   [key: string]: unknown;
 }
 
-const kMethods = ['get', 'post', 'put', 'patch', 'delete', 'head'];
+const kMethods = ['get', 'post', 'put', 'patch', 'delete', 'head', 'options'];
 
 let openapi: Document;
 

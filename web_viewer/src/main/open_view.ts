@@ -7,6 +7,7 @@ import { carriesTransfer, readPacked } from '../asset/unpack';
 import { Relighter } from '../light/relighter';
 import { announce } from '../ui/dom';
 import { bytes } from '../ui/format';
+import { History } from '../ui/history';
 import { applyTheme } from '../ui/theme';
 import { Page } from './page';
 import { createContext } from './webgl';
@@ -89,8 +90,10 @@ async function start(): Promise<void> {
   page.overlay.show('Asking for the job', null);
   try {
     await open(page);
+    document.querySelector('.panel')?.append(new History(page.id).element);
   } catch (error) {
     page.fail((error as Error).message);
+    page.overlay.element.append(new History(page.id).element);
     page.dispose();
   }
 }

@@ -12,6 +12,7 @@ import {
 } from '../asset/jobs';
 import { copyText, h, replaceChildren } from './dom';
 import { ago, bytes, percent, plain, seconds } from './format';
+import { History } from './history';
 
 export interface CardActions {
   cancel(job: Job): void;
@@ -40,6 +41,7 @@ export class JobCard {
   private readonly recipe = h('dl', { class: 'pairs' });
   private readonly files = h('ul', { class: 'files' });
   private readonly buttons = h('div', { class: 'card-buttons' });
+  private readonly history: History;
   private shownThumb = '';
   private certified: string | null = null; // null: not asked for yet
 
@@ -48,15 +50,17 @@ export class JobCard {
     private readonly actions: CardActions,
   ) {
     this.job = job;
+    this.history = new History(job.id);
     this.progress.append(this.bar, this.stage);
     const details = h('details', {}, h('summary', {}, 'Parameters and files'), this.recipe, this.files);
     const body = h('div', { class: 'card-body' }, h('div', { class: 'card-head' }, this.title, this.status));
-    body.append(this.facts, this.progress, this.problem, details, this.buttons);
+    body.append(this.facts, this.progress, this.problem, details, this.history.element, this.buttons);
     this.element = h('article', { class: 'card', 'data-job': job.id }, this.picture, body);
     this.update(job);
   }
 
   update(job: Job): void {
+    if (job.status !== this.job.status || job.attempt !== this.job.attempt) this.history.refresh();
     this.job = job;
     const name = job.label || job.id;
     this.element.dataset.status = job.status;

@@ -1,0 +1,213 @@
+// Uploads in pieces, in every place of blobs; and every system call of a piece as the last one (files alone).
+
+#include "server/blobs/partial_upload.h"
+
+#include <fstream>
+
+#include "tests/server/blobs/blob_conformance.h"
+#include "tests/server/blobs/faulty_files.h"
+
+namespace kiln::testing {
+namespace {
+
+const std::string kText = "the first piece, the second piece, and the end";
+
+PartialUpload wanted(const std::string& tenant = "studio") {
+  PartialUpload upload;
+  upload.id = std::string(31, 'a') + "1";
+  upload.tenant = tenant;
+  upload.length = kText.size();
+  upload.metadata = "filename c2NlbmU=";
+  return upload;
+}
+
+Result<PartialUpload> send(PartialUploads& uploads, const PartialUpload& upload, std::size_t from, std::size_t to) {
+  KILN_TRY(writer, uploads.append(upload, from));
+  if (auto written = writer.write(bytes_of(kText.substr(from, to - from))); !written) {
+    return tl::make_unexpected(written.error());
+  }
+  return writer.keep();
+}
+
+TEST_P(BlobConformance, AnUploadInPiecesBecomesItsBlob) {
+  PartialUploads uploads(store());
+  const PartialUpload begun = uploads.begin(wanted()).value();
+  EXPECT_EQ(begun.offset, 0U);
+  EXPECT_GT(begun.expires_s, ::time(nullptr) + 23 * 3600);
+  EXPECT_EQ(send(uploads, begun, 0, 17)->offset, 17U);
+  EXPECT_EQ(uploads.unfinished("studio"), 1);
+  const PartialUpload whole = send(uploads, begun, 17, kText.size()).value();
+  const StoredBlob blob = uploads.store(whole).value();
+  EXPECT_EQ(read(store(), blob.sha256), kText);
+  // A crash before finish(): the blob is found again.
+  EXPECT_EQ(uploads.store(uploads.find(whole.id, "studio").value())->sha256, blob.sha256);
+  ASSERT_TRUE(uploads.finish(whole, blob.sha256));
+  const PartialUpload done = uploads.find(whole.id, "studio").value();
+  EXPECT_TRUE(done.done);
+  EXPECT_EQ(done.sha256, blob.sha256);
+  EXPECT_EQ(done.metadata, begun.metadata);
+  EXPECT_EQ(uploads.unfinished("studio"), 0);
+  EXPECT_TRUE(uploads.remove(done));
+  EXPECT_EQ(spooled(), 0U);
+}
+
+TEST_P(BlobConformance, AnUploadInPiecesHasOneWriterAndOneOffset) {
+  PartialUploads uploads(store());
+  const PartialUpload upload = uploads.begin(wanted()).value();
+  {
+    auto writer = uploads.append(upload, 0).value();
+    EXPECT_EQ(uploads.append(upload, 0).error().code, "upload_busy");
+    EXPECT_EQ(uploads.remove(upload).error().code, "upload_busy");
+    EXPECT_TRUE(writer.write(bytes_of(kText.substr(0, 5))));
+  }  // cut: what came counts
+  EXPECT_EQ(uploads.find(upload.id, "studio")->offset, 5U);
+  EXPECT_EQ(uploads.append(upload, 0).error().code, "offset_mismatch");
+  EXPECT_EQ(uploads.append(upload, 6).error().code, "offset_mismatch");
+  EXPECT_EQ(uploads.begin(wanted())->offset, 5U) << "asked for again";
+  auto writer = uploads.append(upload, 5).value();
+  EXPECT_EQ(writer.write(bytes_of(kText)).error().code, "too_large");
+}
+
+TEST_P(BlobConformance, AnUploadInPiecesGoesOnThroughAnotherProgramWithTheSameSpool) {
+  PartialUploads uploads(store());
+  const PartialUpload upload = uploads.begin(wanted()).value();
+  ASSERT_TRUE(send(uploads, upload, 0, 5));
+  const auto other_store = open();
+  PartialUploads others(*other_store);
+  EXPECT_EQ(others.find(upload.id, "studio")->offset, 5U);
+  {
+    const auto writer = uploads.append(upload, 5).value();
+    EXPECT_EQ(others.append(upload, 5).error().code, "upload_busy");
+  }
+  const PartialUpload whole = send(others, upload, 5, kText.size()).value();
+  EXPECT_EQ(read(store(), others.store(whole)->sha256), kText);
+}
+
+TEST_P(BlobConformance, APieceThatCountsWholeOrNotAtAllLeavesNothingWhenItIsDropped) {
+  PartialUploads uploads(store());
+  const PartialUpload upload = uploads.begin(wanted()).value();
+  ASSERT_TRUE(send(uploads, upload, 0, 5));
+  {
+    auto writer = uploads.append(upload, 5).value();
+    writer.all_or_nothing();
+    EXPECT_TRUE(writer.write(bytes_of("other bytes")));
+  }
+  EXPECT_EQ(uploads.find(upload.id, "studio")->offset, 5U);
+  const PartialUpload whole = send(uploads, upload, 5, kText.size()).value();
+  EXPECT_EQ(uploads.store(whole)->sha256, sha256_hex(bytes_of(kText)));
+}
+
+TEST_P(BlobConformance, AnUploadInPiecesWithOtherBytesThanAnnouncedIsGone) {
+  PartialUploads uploads(store());
+  PartialUpload lie = wanted();
+  lie.expected = std::string(64, 'b');
+  const PartialUpload whole = send(uploads, uploads.begin(lie).value(), 0, kText.size()).value();
+  EXPECT_EQ(uploads.store(whole).error().code, "hash_mismatch");
+  EXPECT_FALSE(store().exists(sha256_hex(bytes_of(kText))));
+  EXPECT_EQ(uploads.find(lie.id, "studio").error().code, "not_found");
+  EXPECT_EQ(spooled(), 0U);
+}
+
+TEST_P(BlobConformance, AnUploadInPiecesIsItsTenantsAndExpires) {
+  PartialUploads uploads(store());
+  const PartialUpload upload = uploads.begin(wanted()).value();
+  EXPECT_EQ(uploads.find(upload.id, "other").error().code, "not_found");
+  EXPECT_EQ(uploads.find("../" + upload.id, "studio").error().code, "not_found");
+  EXPECT_EQ(uploads.append(wanted("other"), 0).error().code, "not_found");
+  EXPECT_EQ(store().remove_dead_writers(), 0) << "a restart keeps it";
+  EXPECT_EQ(store().expire_partials(3600), 0);
+  {
+    const auto writer = uploads.append(upload, 0).value();
+    store().expire_partials(0);
+    EXPECT_EQ(uploads.append(upload, 0).error().code, "upload_busy") << "not while somebody writes it";
+  }
+  store().expire_partials(0);
+  EXPECT_EQ(spooled(), 0U);
+  EXPECT_EQ(uploads.find(upload.id, "studio").error().code, "not_found");
+}
+
+class PieceCrash : public BlobTest {
+ protected:
+  void clear() const {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directory(folder_);
+  }
+  /// How much was acknowledged before the end, and whether the whole blob was.
+  struct Acknowledged {
+    std::uint64_t bytes = 0;
+    bool blob = false;
+  };
+  static void upload(BlobStore& blobs, Acknowledged& told) {
+    PartialUploads uploads(blobs);
+    auto begun = uploads.begin(wanted());
+    if (!begun) return;
+    for (const std::size_t end : {std::size_t{17}, std::size_t{30}, kText.size()}) {
+      begun = send(uploads, *begun, begun->offset, end);
+      if (!begun) return;
+      told.bytes = begun->offset;
+    }
+    const auto stored = uploads.store(*begun);
+    if (stored) told.blob = uploads.finish(*begun, stored->sha256).has_value();
+  }
+  /// What was acknowledged is there, and the rest can be sent.
+  void expect_goes_on(const Acknowledged& told) const {
+    FaultyFiles healthy;
+    const auto blobs = open_file_blobs(folder_, healthy).value();
+    blobs->remove_dead_writers();
+    PartialUploads uploads(*blobs);
+    auto known = uploads.begin(wanted());
+    ASSERT_TRUE(known) << known.error().message;
+    EXPECT_GE(known->offset, told.bytes);
+    EXPECT_TRUE(!told.blob || known->done);
+    if (!known->done && known->offset < kText.size()) known = send(uploads, *known, known->offset, kText.size());
+    ASSERT_TRUE(known) << known.error().message;
+    const auto stored = known->done ? StoredBlob{known->sha256} : uploads.store(*known).value();
+    EXPECT_EQ(read(*blobs, stored.sha256), kText);
+  }
+};
+
+TEST_F(PieceCrash, AKillAfterAnyCallKeepsEveryAcknowledgedByte) {
+  for (const bool power_cut : {false, true}) {
+    bool killed = true;
+    for (int call = 0; killed; ++call) {
+      clear();
+      FaultyFiles files;
+      Acknowledged told;
+      try {
+        const auto blobs = open_file_blobs(folder_, files).value();
+        files.kill_at = files.calls + call;
+        upload(*blobs, told);
+        killed = false;
+      } catch (const Killed&) {
+      }
+      if (power_cut) files.cut_power();
+      SCOPED_TRACE("after call " + std::to_string(call) + (power_cut ? " with a power cut" : ""));
+      expect_goes_on(told);
+      ASSERT_LT(call, 200);
+    }
+  }
+}
+
+TEST_F(PieceCrash, AFailureOfAnyCallIsToldAndWhatWasAcknowledgedStays) {
+  for (const int error : {EIO, ENOSPC}) {
+    bool failed = true;
+    for (int call = 0; failed; ++call) {
+      clear();
+      FaultyFiles files;
+      files.error = error;
+      const auto blobs = open_file_blobs(folder_, files).value();
+      files.fail_at = files.calls + call;
+      Acknowledged told;
+      upload(*blobs, told);
+      failed = !files.failed_call.empty();
+      SCOPED_TRACE("call " + std::to_string(call) + " " + files.failed_call);
+      // A failed sync of bytes means that the upload is lost, and that is what the next question is told.
+      if (files.failed_call == "fsync") told = {};
+      expect_goes_on(told);
+      ASSERT_LT(call, 200);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kiln::testing
