@@ -72,6 +72,7 @@ class LocalService final : public Service {
     supervisor_.start();
     housekeeping_.start();
     neighbours_.start();
+    webhooks_.start();
   }
   void drain() override;
 
@@ -123,6 +124,7 @@ class LocalService final : public Service {
   Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), options_.blob_grace};
   Neighbours neighbours_{place(), supervisor_};
+  Webhooks webhooks_{*store_, options_.webhooks};
 };
 
 class LocalUpload final : public AssetUpload {
@@ -160,6 +162,7 @@ void LocalService::drain() {
   plans_stop_.ask(StopReason::drain);
   supervisor_.stop();
   housekeeping_.stop();
+  webhooks_.stop();
   while (plans_ > 0) std::this_thread::sleep_for(Millis(5));
 }
 

@@ -20,6 +20,7 @@
 #include "core/bake/recipe.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/webhooks/webhooks.h"
 #include "server/work/stores.h"
 
 namespace kiln {
@@ -36,6 +37,7 @@ struct ServiceOptions {
   Millis blob_grace{24 * 3600 * 1000};
   Millis lease{60'000};          // a job whose server says nothing for so long is given to another
   Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
+  WebhookOptions webhooks;       // who is told when jobs end
   bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
 };
 
