@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kEventsAtOnce = 500;
 constexpr Millis kLongestPause{3600 * 1000};
-constexpr int kGone = 410;  // the receiver wants no more of this
+constexpr Millis kBesidesTry{10'000};  // of a lease: a try, and time to write down its end
+constexpr int kGone = 410;             // the receiver wants no more of this
 
 /// In [0, 1).
 double chance() { return static_cast<double>(std::stoul(random_token().substr(0, 8), nullptr, 16)) / 4294967296.0; }
@@ -124,7 +125,7 @@ Result<bool> Webhooks::plan() {
 /// False when nothing is due.
 Result<bool> Webhooks::deliver_one(const WebhookReceiver& receiver) {
   DeliveryQueue& queue = store_.deliveries();
-  KILN_TRY(due, queue.take(receiver.url, options_.timeout * 4));
+  KILN_TRY(due, queue.take(receiver.url, options_.timeout + kBesidesTry));
   if (!due) return false;
   const std::int64_t sent_s = now_s();
   WebhookPost post;

@@ -4,11 +4,13 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "core/base/sha256.h"
 #include "tests/faults/daemon.h"
@@ -86,11 +88,12 @@ TEST_F(KilndTest, AReceiverHearsOfAJobThoughTheServerWasKilledBeforeItListened) 
     EXPECT_EQ(http_put(daemon->port(), "/v1/assets/" + scene, cube_glb()).status, 201);
     id = json::parse(http_post(daemon->port(), "/v1/jobs", cube_job(scene, 1)).body).at("id");
     ASSERT_TRUE(receiver.wait_for(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
     daemon->kill_hard();
   }
   receiver.fail(0, 0);
   const auto daemon = start(arguments);
-  ASSERT_TRUE(receiver.wait_for(2)) << "due 5 s after the first try";
+  ASSERT_TRUE(receiver.wait_for(2)) << "due 5 s after the first try, or 25 s if it died before it could note that";
   const auto messages = receiver.messages();
   EXPECT_EQ(messages[1].id, messages[0].id);
   EXPECT_EQ(json::parse(messages[1].body)["type"], "job.succeeded");
