@@ -18,12 +18,18 @@ mkdir -p "$root/.kiln/fuzz/crashes"
 
 seeds_of() { # the folders that CMakeLists.txt names, as far as they are here
   local models="$root/../shared/models" folder
-  for folder in "$here/seeds/$1" "$root/tests/browser/fixtures" "$models/hostile" "$models/conformance"; do
+  for folder in "$here/seeds/$1" "$root/tests/browser/fixtures" "$models/hostile" "$models/conformance" \
+    "$root/.kiln/fuzz/packed"; do
     case "$1:$folder" in
       scene:* | artefact:*/fixtures | ply:*/hostile | *:*/seeds/*) [ ! -d "$folder" ] || echo "$folder" ;;
     esac
   done
 }
+
+# Seeds in one piece, so that mutations reach the binary part of a glTF.
+if [ -d "$root/../shared/models" ] && command -v python3 >/dev/null; then
+  python3 "$here/pack.py" "$root/../shared/models" "$root/.kiln/fuzz/packed"
+fi
 
 # What a library asks for in vain it is told so (std::bad_alloc), as under the limits of a worker.
 export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 UBSAN_OPTIONS=print_stacktrace=1
@@ -32,7 +38,7 @@ for name in "$@"; do
   corpus="$root/.kiln/fuzz/$name"
   mkdir -p "$corpus"
   mapfile -t seeds < <(seeds_of "$name")
-  options=(-max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=131072 -print_final_stats=1)
+  options=(-max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=524288 -print_final_stats=1)
   case "$name" in scene | artefact) options+=(-dict="$here/gltf.dict") ;; esac
   log="$root/.kiln/fuzz/$name.log"
   "$root/build/fuzz/tests/fuzz/fuzz_$name" "${options[@]}" -artifact_prefix="$root/.kiln/fuzz/crashes/$name-" \
