@@ -112,7 +112,6 @@ def main():
         unshare = ["unshare", "--mount", "--pid", "--fork", "--kill-child", sys.executable, *sys.argv, "--inside"]
         return subprocess.run(unshare).returncode
     root, base = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
-    subprocess.run(["mount", "--make-rprivate", "/"], check=True)
     folder = pathlib.Path(tempfile.mkdtemp(dir=root / ".kiln"))
     try:
         healthy = serve(*build(root, base, folder))

@@ -31,6 +31,9 @@ make_base() { # package sources are this machine's own
 work=$(mktemp -d "$root/.kiln/fresh.XXXXXX")
 trap 'rm -rf --one-file-system "$work"' EXIT
 mkdir "$work/upper" "$work/under" "$work/tree"
+layers="lowerdir=$base,upperdir=$work/upper,workdir=$work/under"
+unshare --mount mount -t overlay overlay -o "$layers" "$work/tree" 2>/dev/null ||
+  skip "no namespaces or no overlay here (a container, perhaps)"
 (cd "$work" && cpack --config "$build/CPackConfig.cmake" -B "$work/package" >"$work/cpack.log" 2>&1) ||
   { tail -n 20 "$work/cpack.log"; exit 1; }
 mv "$work"/package/kiln_*.deb "$work/kiln.deb"
@@ -85,13 +88,12 @@ INSIDE
 # shellcheck disable=SC2016
 # In namespaces of its own: no mount and no process outlives this.
 unshare --mount --pid --fork --kill-child bash -euc '
-  work=$1 base=$2
-  mount --make-rprivate /
-  mount -t overlay overlay -o "lowerdir=$base,upperdir=$work/upper,workdir=$work/under" "$work/tree"
+  work=$1 layers=$2
+  mount -t overlay overlay -o "$layers" "$work/tree"
   mount -t proc proc "$work/tree/proc"
   mount --rbind /sys "$work/tree/sys" && mount --rbind /dev "$work/tree/dev"
   cp -L /etc/resolv.conf "$work/tree/etc/resolv.conf"
   cp "$work/kiln.deb" "$work/inside" "$work/tree/"
   exec env -i HOME=/root LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     $(env | grep -iE "^(https?_proxy|no_proxy|SSL_CERT_FILE)=" || true) chroot "$work/tree" /bin/bash /inside
-' -- "$work" "$base"
+' -- "$work" "$layers"

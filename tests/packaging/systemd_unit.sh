@@ -47,7 +47,6 @@ UNIT
 # shellcheck disable=SC2016
 unshare --mount --pid --fork --kill-child --mount-proc bash -euc '
   work=$1 base=$2
-  mount --make-rprivate /
   mount -t overlay overlay -o "lowerdir=$base,upperdir=$work/upper,workdir=$work/under" "$work/tree"
   cp -L /etc/resolv.conf "$work/tree/etc/resolv.conf"
   cp "$work/kiln.deb" "$work/check" "$work/tree/"
