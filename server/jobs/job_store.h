@@ -95,6 +95,8 @@ class BlobGate {
   virtual ~BlobGate() = default;
 };
 
+class DeliveryQueue;  // delivery.h
+
 /// Codes of faults: store_failed, store_unavailable (no connection to the database now: try again), disk_full (the
 /// database cannot grow), not_found, bad_cursor, queue_full, quota, idempotency_mismatch, asset_not_found, poisoned
 /// (the same content crashed its worker twice within 24 h), not_terminal, pinned, daily_quota.
@@ -165,6 +167,9 @@ class JobStore {
   virtual Result<std::unique_ptr<BlobGate>> enter_blob_gate() = 0;
   /// Alone. "gate_busy" when others stay too long: try again later.
   virtual Result<std::unique_ptr<BlobGate>> close_blob_gate() = 0;
+
+  /// Messages that wait for their receivers.
+  virtual DeliveryQueue& deliveries() = 0;
 
   /// Other programs write to this store as well: only the end of a lease tells that a worker is gone.
   virtual bool shared() const = 0;

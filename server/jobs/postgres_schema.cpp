@@ -132,6 +132,20 @@ CREATE TABLE kiln.upload_day(
 UPDATE kiln.meta SET version=2;
 )sql";
 
+// A table that older programs need not know, so it comes without a new version.
+constexpr const char* kDeliveries = R"sql(
+CREATE TABLE kiln.delivery(
+  message kiln.word NOT NULL,
+  receiver kiln.word NOT NULL,
+  body kiln.word NOT NULL,
+  attempt BIGINT NOT NULL DEFAULT 0,
+  created_at BIGINT NOT NULL,
+  due_at BIGINT NOT NULL,
+  PRIMARY KEY(message, receiver)
+);
+CREATE INDEX delivery_by_due ON kiln.delivery(receiver, due_at, message);
+)sql";
+
 Result<void> make_or_check(PostgresConnection& db) {
   KILN_DO(db.query("SELECT pg_advisory_xact_lock(1802071150, 0)"));  // "kiln" as a number; released with the end
   KILN_TRY(found, db.query("SELECT to_regclass('kiln.meta')::text"));
@@ -140,11 +154,16 @@ Result<void> make_or_check(PostgresConnection& db) {
     KILN_DO(db.execute(kTables));
   }
   KILN_TRY(version, db.query("SELECT version FROM kiln.meta"));
-  if (version.front().integer(0) == 1) return db.execute(kVersion2);
-  if (version.front().integer(0) == kVersion) return {};
-  return fault("schema_too_new", "the job store was written by another version of this program (schema " +
-                                     std::to_string(version.front().integer(0)) + ", this one knows " +
-                                     std::to_string(kVersion) + ")");
+  if (version.front().integer(0) == 1) {
+    KILN_DO(db.execute(kVersion2));
+  } else if (version.front().integer(0) != kVersion) {
+    return fault("schema_too_new", "the job store was written by another version of this program (schema " +
+                                       std::to_string(version.front().integer(0)) + ", this one knows " +
+                                       std::to_string(kVersion) + ")");
+  }
+  KILN_TRY(deliveries, db.query("SELECT to_regclass('kiln.delivery')::text"));
+  if (!deliveries.front().is_null(0)) return {};
+  return db.execute(kDeliveries);
 }
 
 }  // namespace

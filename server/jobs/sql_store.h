@@ -9,6 +9,7 @@
 #include "server/jobs/ids.h"
 #include "server/jobs/job_store.h"
 #include "server/jobs/sql.h"
+#include "server/jobs/sql_deliveries.h"
 #include "server/jobs/sql_rows.h"
 
 namespace kiln::sql {
@@ -53,6 +54,7 @@ class SqlStore final : public JobStore {
 
   Result<std::unique_ptr<BlobGate>> enter_blob_gate() override { return engine_->blob_gate(false); }
   Result<std::unique_ptr<BlobGate>> close_blob_gate() override { return engine_->blob_gate(true); }
+  DeliveryQueue& deliveries() override { return deliveries_; }
   bool shared() const override { return engine_->shared(); }
   void on_change(std::function<void()> wake) override { engine_->on_change(std::move(wake)); }
 
@@ -83,6 +85,7 @@ class SqlStore final : public JobStore {
   Result<Wrote> requeue(const ClaimRef&, const Retry&, const char* counters);
 
   std::unique_ptr<Engine> engine_;
+  SqlDeliveries deliveries_{*engine_};
   std::mutex ids_mutex_;
   UlidGenerator ids_;
 };

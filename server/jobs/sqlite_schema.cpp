@@ -121,6 +121,20 @@ CREATE TABLE upload_day(
 ) STRICT;
 )sql";
 
+// A table that older programs need not know, so it comes without a new version.
+constexpr const char* kDeliveries = R"sql(
+CREATE TABLE IF NOT EXISTS delivery(
+  message TEXT NOT NULL,
+  receiver TEXT NOT NULL,
+  body TEXT NOT NULL,
+  attempt INTEGER NOT NULL DEFAULT 0,
+  created_at INTEGER NOT NULL,
+  due_at INTEGER NOT NULL,
+  PRIMARY KEY(message, receiver)
+) STRICT;
+CREATE INDEX IF NOT EXISTS delivery_by_due ON delivery(receiver, due_at, message);
+)sql";
+
 struct Setting {
   const char* set;
   const char* read;
@@ -191,6 +205,7 @@ Result<void> make_tables(SqliteConnection& db) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +
                                        ", this one knows " + std::to_string(kSchemaVersion) + ")");
   }
+  KILN_DO(db.execute(kDeliveries));
   return transaction.commit();
 }
 

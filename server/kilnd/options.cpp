@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "core/bake/bake.h"
+#include "server/webhooks/receivers.h"
 
 namespace kiln {
 namespace {
@@ -26,7 +27,7 @@ CLI::Option* add(CLI::App& app, const std::string& flag, T& value, const std::st
 
 /// Values that have no member of their own type in ServiceOptions.
 struct RawOptions {
-  std::string data = "kiln-data", worker_command;
+  std::string data = "kiln-data", worker_command, webhook_file;
   double soft_percent = 10, hard_percent = 5, blob_grace_s = 24 * 3600, first_retry_s = 10, lease_s = 60, keep_days = 0;
 };
 
@@ -66,6 +67,11 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
       ->check(CLI::Range(1.0, 3600.0));
   add(app, "--first-retry-s", raw.first_retry_s, "pause after trouble of the machine, four times longer each time")
       ->check(CLI::NonNegativeNumber);
+  add(app, "--webhook-file", raw.webhook_file,
+      "file of receivers that are told when jobs end: https://address whsec_SECRET [tenant=NAME], one a line");
+  app.add_flag("--webhook-private", options.service.webhooks.private_too,
+               "receivers may be in this machine's own network, and http://")
+      ->envname("KILN_WEBHOOK_PRIVATE");
   add(app, "--worker-command", raw.worker_command, "another program as worker, for tests")->group("");
   app.add_flag("--require-sandbox", options.service.require_sandbox,
                "refuse to start where workers cannot be locked in")
@@ -131,6 +137,11 @@ tl::expected<DaemonOptions, EarlyExit> parse_options(int argc, const char* const
   if (const auto sound = check_addresses(options.service.stores); !sound) return refuse(sound.error().message);
   if (tells_password(options.service.stores, argc, argv)) {
     return refuse("a password on the command line is seen by all: use PGPASSWORD, a passfile, or KILN_STORE");
+  }
+  if (!raw.webhook_file.empty()) {
+    auto receivers = read_webhook_receivers(raw.webhook_file, options.service.webhooks.private_too);
+    if (!receivers) return refuse(receivers.error().message);
+    options.service.webhooks.receivers = std::move(*receivers);
   }
   const bool wants_object = options.admin == "backup" || options.admin.ends_with("pin");
   if (wants_object == options.admin_object.empty()) {

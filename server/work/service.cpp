@@ -77,6 +77,7 @@ class LocalService final : public Service {
     supervisor_.start();
     housekeeping_.start();
     neighbours_.start();
+    webhooks_.start();
   }
   void drain() override;
 
@@ -157,6 +158,7 @@ class LocalService final : public Service {
   Housekeeping housekeeping_{place(), {options_.blob_grace, options_.retention}};
   Neighbours neighbours_{place(), supervisor_};
   UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};
+  Webhooks webhooks_{*store_, options_.webhooks};
 };
 
 class LocalUpload final : public AssetUpload {
@@ -189,6 +191,7 @@ void LocalService::drain() {
   plans_stop_.ask(StopReason::drain);
   supervisor_.stop();
   housekeeping_.stop();
+  webhooks_.stop();
   while (plans_ > 0) std::this_thread::sleep_for(Millis(5));
 }
 

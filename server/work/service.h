@@ -21,6 +21,7 @@
 #include "core/base/durations.h"
 #include "server/blobs/blob_store.h"
 #include "server/jobs/job_store.h"
+#include "server/webhooks/webhooks.h"
 #include "server/work/sandbox.h"
 #include "server/work/stores.h"
 #include "server/work/upload_desk.h"
@@ -40,6 +41,7 @@ struct ServiceOptions {
   Retention retention;           // how long jobs that ended are kept
   Millis lease{60'000};          // a job whose server says nothing for so long is given to another
   Millis first_retry{10'000};    // after trouble of the machine: x 4 each time, at most 1 h, 5 times
+  WebhookOptions webhooks;       // who is told when jobs end
   bool require_sandbox = false;  // jobs fail where workers cannot lock themselves in (sandbox.h)
 };
 

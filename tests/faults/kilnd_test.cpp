@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
@@ -13,6 +14,7 @@
 
 #include "core/base/sha256.h"
 #include "tests/faults/daemon.h"
+#include "tests/fixtures/webhook_receiver.h"
 
 namespace kiln::testing {
 namespace {
@@ -71,6 +73,40 @@ TEST_F(KilndTest, WithATokenFileNobodyElseIsServed) {
   const auto daemon = start({"--token-file", folder_ / "tokens"});
   EXPECT_EQ(http_get(daemon->port(), "/v1/jobs").status, 401);
   EXPECT_EQ(http_get(daemon->port(), "/healthz").status, 200);
+}
+
+TEST_F(KilndTest, AReceiverHearsOfAJobThoughTheServerWasKilledBeforeItListened) {
+  WebhookReceiver receiver;
+  receiver.fail(503, 1000);
+  std::ofstream(folder_ / "hooks") << receiver.url() << " whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
+  const std::vector<std::string> arguments{
+      "--webhook-file", folder_ / "hooks", "--webhook-private", "--soft-free-percent", "0", "--hard-free-percent", "0"};
+  std::string id;
+  {
+    const auto daemon = start(arguments);
+    const std::string scene = sha256_of(cube_glb());
+    EXPECT_EQ(http_put(daemon->port(), "/v1/assets/" + scene, cube_glb()).status, 201);
+    id = json::parse(http_post(daemon->port(), "/v1/jobs", cube_job(scene, 1)).body).at("id");
+    ASSERT_TRUE(receiver.wait_for(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    daemon->kill_hard();
+  }
+  receiver.fail(0, 0);
+  const auto daemon = start(arguments);
+  ASSERT_TRUE(receiver.wait_for(2)) << "due 5 s after the first try, or 25 s if it died before it could note that";
+  const auto messages = receiver.messages();
+  EXPECT_EQ(messages[1].id, messages[0].id);
+  EXPECT_EQ(json::parse(messages[1].body)["type"], "job.succeeded");
+  EXPECT_EQ(json::parse(messages[1].body)["data"]["id"], id);
+}
+
+TEST_F(KilndTest, AFileOfWebhooksThatNamesNobodyIsRefusedInOneLine) {
+  std::ofstream(folder_ / "hooks") << "http://127.0.0.1/ whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
+  for (const char* file : {"hooks", "missing"}) {
+    const End end = refuse("--webhook-file " + (folder_ / file).string());
+    EXPECT_EQ(end.code, 78);
+    EXPECT_EQ(std::ranges::count(end.text, '\n'), 1) << end.text;
+  }
 }
 
 TEST_F(KilndTest, ASecondServerOnTheSameDataIsRefused) {

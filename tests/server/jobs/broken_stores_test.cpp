@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "server/jobs/delivery.h"
 #include "tests/server/jobs/store_conformance.h"
 
 namespace kiln::testing {
@@ -24,7 +25,26 @@ enum class Flaw {
   open_doors,        // a tenant sees the blobs of others
   deaf_cancels,      // a running job is not told that it was canceled
   loose_pins,        // what is pinned goes all the same
-  free_uploads       // nobody counts what comes
+  free_uploads,      // nobody counts what comes
+  hasty_deliveries   // one that somebody works on is given to others as well
+};
+
+/// Takes for so short a time that the next one takes it too.
+class HastyDeliveries final : public DeliveryQueue {
+ public:
+  explicit HastyDeliveries(DeliveryQueue& queue) : queue_(queue) {}
+  Result<DeliveryMark> mark() override { return queue_.mark(); }
+  Result<Wrote> add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery> all) override {
+    return queue_.add(from, to, all);
+  }
+  Result<std::optional<Delivery>> take(const std::string& receiver, Millis) override {
+    return queue_.take(receiver, Millis(0));
+  }
+  Result<void> finish(const Delivery& delivery) override { return queue_.finish(delivery); }
+  Result<void> retry(const Delivery& delivery, Millis delay) override { return queue_.retry(delivery, delay); }
+
+ private:
+  DeliveryQueue& queue_;
 };
 
 /// SQLite, with one flaw on top.
@@ -102,6 +122,7 @@ class BrokenStore final : public JobStore {
   Result<std::unique_ptr<BlobGate>> close_blob_gate() override {
     return flaw_ == Flaw::open_gate ? store_->enter_blob_gate() : store_->close_blob_gate();
   }
+  DeliveryQueue& deliveries() override { return flaw_ == Flaw::hasty_deliveries ? hasty_ : store_->deliveries(); }
   bool shared() const override { return store_->shared(); }
   void on_change(std::function<void()> wake) override { store_->on_change(std::move(wake)); }
   Result<std::string> identity() override { return store_->identity(); }
@@ -110,6 +131,7 @@ class BrokenStore final : public JobStore {
  private:
   std::unique_ptr<JobStore> store_;
   Flaw flaw_;
+  HastyDeliveries hasty_{store_->deliveries()};
   std::optional<Claim> last_;
   int pages_ = 0;
 };
@@ -133,7 +155,8 @@ std::vector<Engine> engines() {
           broken("open_doors", Flaw::open_doors),
           broken("deaf_cancels", Flaw::deaf_cancels),
           broken("loose_pins", Flaw::loose_pins),
-          broken("free_uploads", Flaw::free_uploads)};
+          broken("free_uploads", Flaw::free_uploads),
+          broken("hasty_deliveries", Flaw::hasty_deliveries)};
 }
 
 /// Counts what fails for each engine, and says nothing itself.
@@ -149,6 +172,7 @@ class Counter : public ::testing::EmptyTestEventListener {
 }  // namespace
 
 INSTANTIATE_TEST_SUITE_P(Broken, StoreConformance, ::testing::ValuesIn(engines()), engine_name);
+INSTANTIATE_TEST_SUITE_P(Broken, StoreDeliveries, ::testing::ValuesIn(engines()), engine_name);
 INSTANTIATE_TEST_SUITE_P(Broken, StoreClaims, ::testing::ValuesIn(engines()), engine_name);
 
 }  // namespace kiln::testing

@@ -33,6 +33,7 @@ Engine postgres() { return {"postgres", open_postgres_on, drop_tables}; }
 }  // namespace
 
 INSTANTIATE_TEST_SUITE_P(PostgreSQL, StoreConformance, ::testing::Values(postgres()), engine_name);
+INSTANTIATE_TEST_SUITE_P(PostgreSQL, StoreDeliveries, ::testing::Values(postgres()), engine_name);
 INSTANTIATE_TEST_SUITE_P(PostgreSQL, StoreClaims, ::testing::Values(postgres()), engine_name);
 
 namespace {

@@ -14,6 +14,7 @@ namespace kiln {
 
 namespace testing {
 INSTANTIATE_TEST_SUITE_P(SQLite, StoreConformance, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
+INSTANTIATE_TEST_SUITE_P(SQLite, StoreDeliveries, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
 INSTANTIATE_TEST_SUITE_P(SQLite, StoreClaims, ::testing::Values(Engine{"sqlite", open_sqlite_on}), engine_name);
 }  // namespace testing
 

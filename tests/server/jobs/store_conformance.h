@@ -57,4 +57,7 @@ class StoreConformance : public ::testing::TestWithParam<Engine> {
 /// Claims, leases, fences: what keeps results exactly-once.
 class StoreClaims : public StoreConformance {};
 
+/// Messages that wait for their receivers.
+class StoreDeliveries : public StoreConformance {};
+
 }  // namespace kiln::testing

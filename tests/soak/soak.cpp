@@ -1,0 +1,72 @@
+// kiln_soak: the faults and loads that take minutes to hours; ctest runs short ones. Loopback and temporary folders
+// only.
+//   kiln_soak kills sqlite|postgres CYCLES
+//   kiln_soak stale ROUNDS
+//   kiln_soak crowd CLIENTS SLOW UPLOADS
+//   kiln_soak steady SECONDS
+// Exit 0: every promise held; 1: a line says which did not; 77: PostgreSQL is not installed.
+
+#include "tests/soak/soak.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <cstdlib>
+#include <stdexcept>
+#include <string_view>
+
+namespace kiln::testing {
+namespace {
+
+int usage() {
+  std::fputs("kiln_soak kills sqlite|postgres CYCLES | stale ROUNDS | crowd CLIENTS SLOW UPLOADS | steady SECONDS\n",
+             stderr);
+  return 2;
+}
+
+/// Two descriptors for each connection: ours and the server's, which inherits the limit.
+void allow_many_descriptors() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
+}
+
+int count_of(const char* text) {
+  const int count = std::atoi(text);
+  if (count <= 0) throw std::invalid_argument("a count above 0 is wanted");
+  return count;
+}
+
+int run(const std::vector<std::string>& words) {
+  if (words.size() < 2) return usage();
+  const std::string& what = words[0];
+  const bool postgres = what == "stale" || (what == "kills" && words[1] == "postgres");
+  if (postgres && postgres_programs().empty()) {
+    std::puts("skipped: the package postgresql is not installed");
+    return 77;
+  }
+  Breaches breaches;
+  if (what == "kills" && words.size() == 3) {
+    run_kills({postgres, count_of(words[2].c_str())}, breaches);
+  } else if (what == "stale" && words.size() == 2) {
+    run_stale({count_of(words[1].c_str())}, breaches);
+  } else if (what == "crowd" && words.size() == 4) {
+    run_crowd({count_of(words[1].c_str()), count_of(words[2].c_str()), count_of(words[3].c_str())}, breaches);
+  } else if (what == "steady" && words.size() == 2) {
+    run_steady({count_of(words[1].c_str())}, breaches);
+  } else {
+    return usage();
+  }
+  return breaches.count() == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace kiln::testing
+
+int main(int argc, char** argv) {
+  ::signal(SIGPIPE, SIG_IGN);
+  ::setenv("PGPASSWORD", kiln::testing::PostgresServer::kPassword, 1);
+  kiln::testing::allow_many_descriptors();
+  return kiln::testing::run({argv + 1, argv + argc});
+}
