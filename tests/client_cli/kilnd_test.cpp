@@ -56,7 +56,9 @@ class Service : public ::testing::Test {
     ASSERT_NE(daemon->url(), "") << "the server did not start";
     ASSERT_EQ(run_kiln({"demo-scene", "room", "-o", scene}).exit, 0);
   }
-  Ran at_server(std::vector<std::string> words) const { return run_kiln(words, {{"KILN_SERVER", daemon->url()}}); }
+  Ran at_server(const std::vector<std::string>& words) const {
+    return run_kiln(words, {{"KILN_SERVER", daemon->url()}});
+  }
 
   static std::unique_ptr<Daemon> daemon;
   Folder folder;

@@ -200,7 +200,7 @@ TEST_F(KilndTest, AJobGoesWhenItsTimeIsOverAndAPinnedOneStays) {
     const int port = daemon->port();
     ASSERT_EQ(http_put(port, "/v1/assets/" + sha256_of(cube), cube).status, 201);
     const auto canceled = [&](int seed, bool pin) {
-      const std::string id = json::parse(http_post(port, "/v1/jobs", cube_job(sha256_of(cube), seed)).body)["id"];
+      std::string id = json::parse(http_post(port, "/v1/jobs", cube_job(sha256_of(cube), seed)).body)["id"];
       EXPECT_TRUE(!pin || http_put(port, "/v1/jobs/" + id + "/pin", "").status == 200);
       EXPECT_EQ(http_post(port, "/v1/jobs/" + id + "/cancel", "").status, 200);
       return id;

@@ -20,7 +20,7 @@ TEST_P(StoreConformance, AJobOlderThanItsTenantKeepsItIsForgottenAndWhatItHeldBe
     EXPECT_TRUE(store().touch_blob(sha('a'), 1, tenant));
     NewJob wanted = job();
     wanted.tenant = tenant;
-    const std::string id = store().create(wanted).value().job.id;
+    std::string id = store().create(wanted).value().job.id;
     EXPECT_EQ(store().cancel(id)->state, JobState::canceled);
     return id;
   };
