@@ -27,11 +27,11 @@ std::size_t baker(Fleet& fleet) {
   throw std::runtime_error("nobody bakes");
 }
 
-/// Some seconds of work: passes until the error is small.
+/// Long enough to be caught at: passes until the error is small.
 std::string long_job(const std::string& scene, int seed) {
   json document = json::parse(cube_job(scene, seed));
   document.erase("certificate");
-  document["quality"] = {{"target_error", 0.004}};
+  document["quality"] = {{"target_error", 0.02}};
   document["environment"] = {{"builtin", "clear"}};
   document["steps"] = {{{"do", "prt"}, {"order", 6}}};
   return document.dump();
@@ -61,7 +61,7 @@ void run_stale(const Stale& stale, Breaches& breaches) {
     const double before = metric(asleep, "stale_commits_total") + metric(asleep, "lost_leases_total");
     ::kill(fleet.node(sleeper).pid(), SIGSTOP);
     json job = ask_job(awake, id);
-    for (int i = 0; i < 1200 && job["status"] != "succeeded"; ++i, job = ask_job(awake, id))
+    for (int i = 0; i < 6000 && job["status"] != "succeeded"; ++i, job = ask_job(awake, id))
       std::this_thread::sleep_for(50ms);
     ::kill(fleet.node(sleeper).pid(), SIGCONT);
     const auto lost = [&] {
