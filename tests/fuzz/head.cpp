@@ -15,6 +15,7 @@ class Pieces : public BodySource {
  public:
   explicit Pieces(std::string_view text) : text_(text) {}
   std::uint64_t length() const override { return text_.size(); }
+  std::uint64_t taken() const override { return at_; }
   Answer<std::size_t> read(std::span<std::uint8_t> out) override {
     const std::size_t count = std::min({std::size_t{7}, out.size(), text_.size() - at_});
     std::copy_n(text_.data() + at_, count, out.data());

@@ -53,7 +53,7 @@ void Fleet::start() {
 std::filesystem::path Fleet::blobs() const { return postgres_ ? folder_ / "shared" : data(0); }
 
 std::string upload_cube(int port) {
-  const std::string scene = sha256_of(cube_glb());
+  std::string scene = sha256_of(cube_glb());
   for (int i = 0; i < 50; ++i) {
     const int status = http_put(port, "/v1/assets/" + scene, cube_glb()).status;
     if (status == 200 || status == 201) return scene;

@@ -4,7 +4,7 @@
 //   kiln_soak stale ROUNDS
 //   kiln_soak crowd CLIENTS SLOW UPLOADS
 //   kiln_soak steady SECONDS
-// Exit 0: every promise held; 1: a line says which did not; 77: PostgreSQL is not installed.
+// Exit 0: every promise held; 1: a line says which did not, or why the run could not go on; 77: no PostgreSQL here.
 
 #include "tests/soak/soak.h"
 
@@ -68,5 +68,11 @@ int main(int argc, char** argv) {
   ::signal(SIGPIPE, SIG_IGN);
   ::setenv("PGPASSWORD", kiln::testing::PostgresServer::kPassword, 1);
   kiln::testing::allow_many_descriptors();
-  return kiln::testing::run({argv + 1, argv + argc});
+  ::setvbuf(stdout, nullptr, _IOLBF, 0);
+  try {
+    return kiln::testing::run({argv + 1, argv + argc});
+  } catch (const std::exception& error) {
+    std::printf("ended early: %s\n", error.what());
+    return 1;
+  }
 }

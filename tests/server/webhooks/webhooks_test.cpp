@@ -69,12 +69,12 @@ class WebhooksTest : public ::testing::Test {
     return store_->create(job).value().job;
   }
   std::string canceled_job(const std::string& tenant = "") {
-    const std::string id = create(tenant).id;
+    std::string id = create(tenant).id;
     EXPECT_TRUE(store_->cancel(id));
     return id;
   }
   std::string failed_job() {
-    const std::string id = create().id;
+    std::string id = create().id;
     const Claim claim = store_->claim(Millis(60'000)).value().value();
     EXPECT_EQ(store_->fail(claim.ref, {{"unknown_format", "It is no glTF.", "a.glb"}, 422}).value(), Wrote::done);
     return id;
