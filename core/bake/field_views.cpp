@@ -15,13 +15,12 @@ namespace {
 /// q of equation 1, but for a factor.
 std::vector<double> wishes(std::span<const FieldView> all) {
   const auto n = static_cast<double>(all.size());
-  double mean = 0, squares = 0;
-  const auto brightness = [](const FieldView& v) { return (v.shown.x + v.shown.y + v.shown.z) / 3; };
-  for (const FieldView& v : all) mean += brightness(v) / n, squares += std::pow(brightness(v), 2) / n;
+  double light = 0, change = 0;
+  for (const FieldView& v : all) light += dot(v.shown, v.shown) / n, change += v.change * v.change / n;
   std::vector<double> out;
   for (const FieldView& v : all) {
-    const double b = brightness(v);
-    out.push_back(1 + (mean > 0 ? b / mean + b * b / squares : 0));
+    out.push_back(1 + (light > 0 ? dot(v.shown, v.shown) / light : 0) +
+                  (change > 0 ? v.change * v.change / change : 0));
   }
   return out;
 }
@@ -62,7 +61,9 @@ std::vector<FieldView> even_views(const BakedScene& decoded, const Mesh& input, 
       if (!match) continue;
       Random random(seed, i);
       const Vec3d there = match_normal(input, *match), view = random_view(there, random);
-      found[i] = FieldView{*match, there, view, eye.seen(here, normal, view), 1};
+      const Vec3d shown = eye.seen(here, normal, view);
+      found[i] =
+          FieldView{*match, there, view, shown, length(shown - eye.seen(here, normal, random_view(there, random)))};
     }
   });
   std::vector<FieldView> out;

@@ -2,12 +2,13 @@
 // Where a certificate of a light field looks: at many places and eyes the file is asked, few of them are traced.
 //
 // Errors of a light field are rare and large where something bright is mirrored: on a helmet of polished metal one eye
-// of 1500 has a third of the squared error, at a hundred times the mean light. What is shown tells where such eyes are.
-// So of many even views those are chosen with the chance
-//   p_i = min(1, count q_i),   q_i ~ 1 + b_i / mean b + b_i^2 / mean b^2,   b: what the file shows                 (1)
-// and each chosen one stands for 1 / p_i of them: sums are those of all views in the mean.
+// of 1500 has a third of the squared error, at a hundred times the mean light. And they are where an eye matters at
+// all: a metal knot on a matt floor has all of them. So of many even views those are chosen with the chance
+//   p_i = min(1, count q_i),   q_i ~ 1 + b_i^2 / mean b^2 + c_i^2 / mean c^2                                        (1)
+// b: what the file shows, c: how far from it is what another eye, drawn at random, sees there;
+// each chosen one stands for 1 / p_i of them: sums are those of all views in the mean.
 // Method  systematic sampling in the order of the surface (stratified, none twice).
-// Units   brightness in W m^-2 sr^-1, the mean of the channels.   Repeat  same views for any thread count
+// Units   W m^-2 sr^-1.   Repeat  same views for any thread count
 
 #include <cstdint>
 #include <span>
@@ -24,6 +25,7 @@ struct FieldView {
   SurfaceMatch truth;  // nearest, with a compatible normal
   Vec3d normal, view;  // of the input there, unit; the view points to the eye
   Vec3d shown;         // by the file
+  double change = 0;   // c of equation 1
   double weight = 1;   // views that this one stands for
 };
 
