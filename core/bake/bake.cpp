@@ -208,7 +208,11 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   pass.merge = transport.merge;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   std::optional<LightFieldStage> stage;
-  if (outgoing) stage.emplace(baked, std::move(*outgoing), plan, log, threads);
+  if (outgoing) {
+    pass.bounce_rays = outgoing->rays;
+    stage.emplace(baked, std::move(*outgoing), plan,
+                  LightFieldStage::Job{light, input.recipe, carried ? &in.field : nullptr}, log, threads);
+  }
   Encoding encoding{.transfer = choose_encoding(baked, plan).encoding};
   if (baked.glossy)
     encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
@@ -232,15 +236,15 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     const Tracer truth(scene, threads);
     pass.certificate = certify(
         decoded, truth, light,
-        {.bake_rays = log.rays(), .thorough = input.recipe.promise && !pass.grid, .seed = input.recipe.seed}, threads);
+        {.bake_rays = log.rays(), .thorough = input.recipe.promise && !plan.radiosity, .seed = input.recipe.seed},
+        threads);
     if (!plan.radiosity) {
       const double merging = pass.merge ? pass.merge->error : 0;
       pass.sources = split_error(*pass.certificate, decoded, {noise, storage, plan.tail_left, merging});
     }
   }
   if (stage) {
-    KILN_TRY(outcome,
-             stage->finish(glb, decoded, {scene, light, input.recipe, carried ? &in.field : nullptr}, log, threads));
+    KILN_TRY(outcome, stage->finish(glb, decoded, scene, threads));
     pass.field = std::move(outcome);
   }
   if (decoded.glossy) {
@@ -266,29 +270,41 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
 }
 
 PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, double elapsed_s) {
-  const ErrorStats& error = pass.certificate->transport;
-  PassRecord out{.order = pass.plan.order,
-                 .samples = pass.plan.samples,
-                 .bounce_samples = pass.plan.bounce_samples,
-                 .bounces = pass.plan.bounces,
-                 .triangles = pass.decoded.scene.mesh.triangles.size(),
-                 .vertices = pass.decoded.scene.mesh.position.size(),
-                 .rays = rays,
-                 .bounce_rays = pass.bounce_rays,
-                 .seconds = seconds,
-                 .certificate_seconds = pass.certificate->seconds,
-                 .elapsed_s = elapsed_s,
-                 .relrmse = error.relrmse,
-                 .low = error.interval_low,
-                 .high = error.interval_high,
-                 .own_relrmse = {},
-                 .own_high = {},
-                 .sources = *pass.sources};
-  if (pass.certificate->job_light) {
-    out.own_relrmse = pass.certificate->job_light->relrmse;
-    out.own_high = pass.certificate->job_light->interval_high;
+  PassRecord out;
+  if (pass.field) {
+    out = field_record(*pass.field);
+  } else {
+    const ErrorStats& error = pass.certificate->transport;
+    out = {.order = pass.plan.order,
+           .samples = pass.plan.samples,
+           .bounce_samples = pass.plan.bounce_samples,
+           .bounces = pass.plan.bounces,
+           .triangles = pass.decoded.scene.mesh.triangles.size(),
+           .vertices = pass.decoded.scene.mesh.position.size(),
+           .relrmse = error.relrmse,
+           .low = error.interval_low,
+           .high = error.interval_high,
+           .own_relrmse = {},
+           .own_high = {},
+           .sources = *pass.sources};
+    if (pass.certificate->job_light) {
+      out.own_relrmse = pass.certificate->job_light->relrmse;
+      out.own_high = pass.certificate->job_light->interval_high;
+    }
   }
+  out.rays = rays;
+  out.bounce_rays = pass.bounce_rays;
+  out.seconds = seconds;
+  if (pass.certificate) out.certificate_seconds += pass.certificate->seconds;
+  out.elapsed_s = elapsed_s;
   return out;
+}
+
+/// What the recipe fixes of the step that is baked in passes.
+PrtStep fixed_knobs(const Recipe& recipe) {
+  if (!recipe.light_field) return recipe.steps.empty() ? PrtStep{} : recipe.steps.front();
+  const LightFieldStep& step = *recipe.light_field;
+  return {.order = step.degree, .samples = step.rays, .subdivide = step.surface.subdivide};
 }
 
 /// A single pass where a quality was asked for; where a promise was made, passes until it is kept or cannot be.
@@ -342,8 +358,8 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
-  const PrtStep step = input.recipe.steps.empty() ? PrtStep{} : input.recipe.steps.front();
-  Passes passes(input.recipe.promise, step, input.recipe.limits);
+  Passes passes(input.recipe.promise, fixed_knobs(input.recipe), input.recipe.limits,
+                input.recipe.light_field ? light_field_passes() : PassKind{});
   KILN_TRY(pass, bake_passes(input, std::move(in), light, plan, passes, checkpoints, log, threads));
 
   log.share(0.97, 1);

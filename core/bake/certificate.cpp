@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <numbers>
-#include <numeric>
 #include <span>
 
 #include "core/artifact/evaluate.h"
 #include "core/bake/lightings.h"
+#include "core/bake/second_look.h"
 #include "core/bake/spending.h"
 #include "core/base/random.h"
 #include "core/mesh/closest_point.h"
@@ -20,9 +19,6 @@
 
 namespace kiln {
 namespace {
-
-constexpr std::size_t kDoubtful = 100;  // one point in so many is looked at again,
-constexpr int kMorePaths = 16;          // with so many times the paths: a sixth of the cost
 
 /// Points on the delivered surface and their places on the input's.
 struct Probe {
@@ -307,10 +303,8 @@ class Judge {
   ReferenceLight light_;
 };
 
-/// A hundredth of the points: where the squared difference and its noise are the largest, in any lighting. Of noise
-/// alone the two are alike, so that leaving out these does not change the expectation of their difference, which is
-/// the error; the largest differences alone would be those that noise has made larger.
-std::vector<std::size_t> doubtful_points(const Judgement& all, std::span<const double> weights) {
+/// The squared difference and its noise at each point, in the lighting where they are the largest.
+std::vector<double> doubts(const Judgement& all, std::span<const double> weights) {
   const std::size_t points = weights.size();
   std::vector<double> part(points, 0.0);
   for (const Samples* samples : {&all.transport, &all.job_light}) {
@@ -323,11 +317,7 @@ std::vector<std::size_t> doubtful_points(const Judgement& all, std::span<const d
       }
     }
   }
-  std::vector<std::size_t> order(points);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, std::greater{}, [&](std::size_t p) { return part[p]; });
-  order.resize((points + kDoubtful - 1) / kDoubtful);
-  return order;
+  return part;
 }
 
 void replace(Samples& all, std::size_t points, const std::vector<std::size_t>& chosen, const Samples& by) {
@@ -342,7 +332,7 @@ void replace(Samples& all, std::size_t points, const std::vector<std::size_t>& c
 /// A path that finds a lamp by chance is an error of the reference that its own noise does not tell. So the points of
 /// the largest errors are looked at again, with many more paths that know nothing of the first.
 void look_again(Judgement& all, const Judge& judge, const Probe& probe, int samples, std::uint64_t seed) {
-  const std::vector<std::size_t> doubtful = doubtful_points(all, probe.weight);
+  const std::vector<std::size_t> doubtful = doubtful_points(doubts(all, probe.weight));
   Probe again;
   for (const std::size_t p : doubtful) {
     again.delivered.push_back(probe.delivered[p]);

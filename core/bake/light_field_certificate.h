@@ -2,9 +2,13 @@
 // The certificate of a light field: what the delivered file shows to eyes around it, against the path-traced reference
 // under the job's own light in full detail.
 //   truth = emission + below (1 - E(n.v)) diffuse + specular + highlights of punctual lights (lightfield/outgoing.h)
-// Points  random on the delivered surface, even by area, each with an eye even over the half space of its normal; the
-//         reference stands at the nearest place of the input surface with a compatible normal. Points inside solids,
-//         which no eye sees, do not count.
+// Views   places even over the delivered surface, each with an eye even over the half space of the input's normal at
+//         the nearest place that looks that way; of very many those are traced that are likely to be wrong, weighted so
+//         that every figure is that of even ones (field_views.h). Places inside solids, which no eye sees, do not
+//         count.
+// Method  a pilot says how many eyes and how many paths for each (spending.h); where the reference is least trusted it
+//         is traced again (second_look.h).
+// Cost    about 5 % of the bake's rays, or a second
 // Never changes the artefact.   Repeat  same numbers for any thread count.
 
 #include <cstdint>
@@ -29,7 +33,7 @@ struct FieldCheck {
   const BakedScene& decoded;
   const Tracer& truth;  // of the input's surface
   const std::optional<Environment>& environment;
-  std::uint64_t bake_rays = 0;  // of which the certificate may take a twentieth
+  std::uint64_t bake_rays = 0;  // what the bake sent: the certificate costs about 5 % of it, or a second
   std::uint64_t seed = 0;
 };
 

@@ -68,6 +68,53 @@ double rms_over_mean(const Mesh& mesh, const LightField& field) {
   return mean > 0 && all > 0 ? std::sqrt(squares / all) / (mean / all) : 1;
 }
 
+/// Simplifies in steps while the judged interval ends below the target. `unit`: of simplify()'s errors. How much a step
+/// really adds to what it is estimated to tells how large the next one is.
+SimplifyResult coarsest(SimplifyResult baked, const FieldPlan& plan, double unit, const JudgeLevel& judge,
+                        std::optional<ErrorStats>& error, Threads& threads) {
+  constexpr int kMostSteps = 5;
+  constexpr double kRoom = 0.95, kFirst = 0.5, kNear = 0.92;  // of the target; near the bound
+  constexpr double kLeast = 1.15, kMost = 3, kShy = 0.87;     // of the last step; of one that failed
+  Simplify params = *plan.simplify;
+  error = judge(baked.lit.mesh, baked.lit.field);
+  // Storage comes after this, and the file is certified at places of its own.
+  const double bound = kRoom * std::sqrt(std::max(0.0, std::pow(*plan.target, 2) - std::pow(plan.storage, 2)));
+  if (error->interval_high > bound) {
+    params.max_error = error->relrmse / 4 / unit;
+    return simplify(std::move(baked.lit), params, threads);
+  }
+  SimplifyResult last = std::move(baked);
+  double done = 0, squares = 0, wanted = kFirst * *plan.target / unit, failed = std::numeric_limits<double>::infinity();
+  for (int step = 0; step < kMostSteps; ++step) {
+    params.max_error = std::sqrt(wanted * wanted - done * done);
+    SimplifyResult next = simplify(last.lit, params, threads);
+    if (next.lit.mesh.triangles.size() == last.lit.mesh.triangles.size()) {
+      const double larger = std::min(kMost * wanted, kShy * failed);
+      if (!(larger > wanted)) break;
+      wanted = larger;
+      continue;
+    }
+    const ErrorStats now = judge(next.lit.mesh, next.lit.field);
+    if (now.interval_high > bound) {
+      failed = wanted;
+    } else {
+      squares += next.error * next.error;
+      last = std::move(next);
+      last.error = std::sqrt(squares);
+      done = wanted;
+      if (now.interval_high > kNear * bound) break;
+    }
+    const double added = std::sqrt(std::max(1e-12, std::pow(now.relrmse, 2) - std::pow(error->relrmse, 2))) / wanted;
+    const double aim = kNear * bound * now.relrmse / now.interval_high;
+    const double left = std::sqrt(std::max(0.0, aim * aim - std::pow(error->relrmse, 2))) / added;
+    const double least = kLeast * done, most = std::min(kMost * std::max(done, wanted), kShy * failed);
+    wanted = std::clamp(left, std::min(least, most), most);
+    if (!(wanted > done)) break;
+  }
+  last.reached = true;
+  return last;
+}
+
 std::size_t coarser(const FieldLevel& level, std::size_t times) {
   return std::max<std::size_t>(4, level.mesh.triangles.size() / times);
 }
@@ -75,7 +122,7 @@ std::size_t coarser(const FieldLevel& level, std::size_t times) {
 }  // namespace
 
 FieldLevels make_levels(const Mesh& mesh, const Transfer& transfer, LightField field, const FieldPlan& plan,
-                        BakeLog& log, Threads& threads) {
+                        const JudgeLevel& judge, BakeLog& log, Threads& threads) {
   const NearestLight light(mesh, transfer);
   const double unit = rms_over_mean(mesh, field);
   FieldLevels out;
@@ -86,7 +133,9 @@ FieldLevels make_levels(const Mesh& mesh, const Transfer& transfer, LightField f
     out.levels.push_back(
         {last.lit.mesh, last.lit.field, light.at(last.lit.mesh, threads), std::sqrt(squares), last.reached});
   };
-  if (plan.simplify) {
+  if (plan.simplify && plan.target) {
+    last = coarsest(std::move(last), plan, unit, judge, out.baked, threads);
+  } else if (plan.simplify) {
     Simplify params = *plan.simplify;
     params.max_error /= unit;
     if (plan.ratio)

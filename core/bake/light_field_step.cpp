@@ -21,8 +21,12 @@ struct FieldEffort {
   double storage;           // relRMSE that storage may add
 };
 
-FieldEffort field_effort(Quality quality) {
-  switch (quality) {
+FieldEffort field_effort(const Recipe& recipe) {
+  if (recipe.promise) {
+    const double target = recipe.promise.target_error.value_or(0.1);
+    return {"the first pass", 4, target < 0.1 ? 256 : 128, 5'000, std::clamp(target / 10, 0.001, 0.02)};
+  }
+  switch (recipe.quality) {
     case Quality::draft:
       return {"the draft quality", 4, 256, 20'000, 0.02};
     case Quality::standard:
@@ -31,6 +35,12 @@ FieldEffort field_effort(Quality quality) {
       break;
   }
   return {"the final quality", 8, 4096, 500'000, 0.005};
+}
+
+/// Of the lit surface that rays find: what they see there is averaged over many.
+Quality surface_quality(const Recipe& recipe) {
+  if (!recipe.promise) return recipe.quality;
+  return recipe.promise.target_error.value_or(0.1) < 0.05 ? Quality::standard : Quality::draft;
 }
 
 TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
@@ -43,6 +53,7 @@ TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
 /// simplification a vertex, .09 to .6 bytes a number of what is delivered, 6 to 12 bytes of memory a number.
 void add_field_prediction(Plan& plan) {
   constexpr double kSecondsARay = 0.4e-6, kSecondsAVertex = 7e-5, kBytesANumber = 0.2, kMemoryANumber = 12;
+  plan.field->surface = plan.prediction;
   const double vertices = static_cast<double>(plan.prediction.vertices);
   const double rays = vertices * 2 * plan.field->outgoing.rays;
   const int d = plan.field->outgoing.degree;
@@ -53,9 +64,18 @@ void add_field_prediction(Plan& plan) {
   plan.prediction.artifact_bytes += static_cast<std::uint64_t>(numbers * kBytesANumber);
 }
 
+void predict_grown_field(Plan& plan, double triangles) {
+  Prediction out = plan.field->surface;
+  const auto grow = [&](std::uint64_t& x) { x = static_cast<std::uint64_t>(static_cast<double>(x) * triangles); };
+  grow(out.triangles), grow(out.vertices), grow(out.rays), grow(out.memory_bytes), grow(out.artifact_bytes);
+  out.seconds *= triangles;
+  plan.prediction = out;
+  add_field_prediction(plan);
+}
+
 void decide_simplification(Plan& plan, const Recipe& recipe) {
   const LightFieldStep& step = *recipe.light_field;
-  const FieldEffort effort = field_effort(recipe.quality);
+  const FieldEffort effort = field_effort(recipe);
   const LightFieldStep::Simplification& s = step.simplify;
   FieldPlan& f = *plan.field;
   f.storage = effort.storage;
@@ -66,6 +86,11 @@ void decide_simplification(Plan& plan, const Recipe& recipe) {
   out.geometry_weight = s.geometry_weight;
   out.collapse = s.collapse;
   const bool asked = s.ratio || s.triangles || s.max_error;
+  if (recipe.promise.target_error && !asked) {
+    f.target = recipe.promise.target_error;
+    return decide(plan, "simplify", "as far as the target allows",
+                  "ever coarser levels are certified until one is above " + short_text(100 * *f.target) + " %");
+  }
   f.ratio = s.ratio;
   if (s.triangles) out.triangles = *s.triangles;
   if (s.max_error || !asked) out.max_error = s.max_error.value_or(effort.storage);
@@ -79,10 +104,11 @@ void decide_simplification(Plan& plan, const Recipe& recipe) {
 
 Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const LightFieldStep& step = *recipe.light_field;
-  const FieldEffort effort = field_effort(recipe.quality);
+  const FieldEffort effort = field_effort(recipe);
   RadiosityStep surface = step.surface;
   if (!surface.subdivide.triangles) surface.subdivide.triangles = scene.mesh.triangles.size() + effort.triangles;
-  Plan plan = make_radiosity_plan(scene, surface, recipe.quality, sky, threads);
+  if (recipe.promise && !surface.subdivide.threshold) surface.subdivide.threshold = 0;
+  Plan plan = make_radiosity_plan(scene, surface, surface_quality(recipe), sky, threads);
   FieldPlan& f = plan.field.emplace();
   f.outgoing.degree = step.degree.value_or(effort.degree);
   f.outgoing.rays = step.rays.value_or(effort.rays);

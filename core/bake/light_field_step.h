@@ -24,6 +24,8 @@ Plan make_light_field_plan(const Scene&, const Recipe&, const Environment* sky, 
 /// to a prediction for the field of its vertices.
 void decide_simplification(Plan&, const Recipe&);
 void add_field_prediction(Plan&);
+/// Of a later pass, which bakes so many times the triangles; degree and rays are the plan's.
+void predict_grown_field(Plan&, double triangles);
 
 /// What the mesh is refined for besides light: colour, emission and finish of the surface.
 class FinishSource {

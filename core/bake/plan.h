@@ -36,8 +36,10 @@ struct FieldPlan {
   double storage = 0.01;             // relRMSE that components and rounding may add
   std::optional<Simplify> simplify;  // what the delivered scene goes through
   std::optional<double> ratio;       // of the baked triangles: simplify->triangles, once they are known
+  std::optional<double> target;      // relRMSE: simplified as far as the certificate allows (light_field_levels.h)
   int lods = 0;                      // coarser levels, each of a quarter of the triangles before it
   bool progressive = false;          // KILN_progressive_mesh
+  Prediction surface;                // of the bake but for the field
 };
 
 struct Plan {

@@ -33,6 +33,16 @@ struct PassRecord {
   ErrorSources sources;
 };
 
+/// What differs between the steps that are baked in passes.
+struct PassKind {
+  double gather_ray = 4, triangle = 300;  // costs of a ray between surfaces and of a triangle, in shadow rays: measured
+  double power = 0.75;                    // of interpolation over triangles, until two passes tell
+  const char* rays = "/steps/0/samples";  // the knob of the noise,
+  const char* last_knob = "a higher /steps/0/subdivide/max_depth may";  // and what is left where none helps
+};
+/// Of a light field: `order` of a record is its degree, `samples` the rays of a vertex, `bounce_rays` all of them.
+PassKind light_field_passes();
+
 /// What became of a promise.
 struct Outlook {
   enum class Ending { target_met, time_spent, floor } ending = Ending::floor;
@@ -42,7 +52,8 @@ struct Outlook {
 /// The passes of one bake.
 class Passes {
  public:
-  Passes(const Promise&, const PrtStep&, const Limits&);
+  /// The step says what the recipe fixes.
+  Passes(const Promise&, const PrtStep&, const Limits&, const PassKind& = {});
 
   void add(const PassRecord&);
   const std::vector<PassRecord>& all() const { return all_; }
@@ -73,12 +84,15 @@ class Passes {
   double interpolation_power() const;
   Growth towards(double wanted) const;
   Growth within(double most) const;
+  bool bands_missing(const Plan& last) const;
+  bool simplified_too_far(const Plan& last) const;
   std::optional<Plan> higher_order(const Plan& last, const Scene&);
   std::optional<Plan> grown(const Plan& last, Growth, const Scene&);
 
   Promise promise_;
   PrtStep step_;
   Limits limits_;
+  PassKind kind_;
   std::vector<PassRecord> all_;
   Outlook outlook_;
 };

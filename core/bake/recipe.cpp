@@ -298,6 +298,24 @@ void read_quality(JsonFields& fields, Recipe& recipe, Errors& errors) {
   }
 }
 
+void check_field_promise(const Recipe& recipe, Errors& errors) {
+  const LightFieldStep& step = *recipe.light_field;
+  const PrtStep::Subdivision& split = step.surface.subdivide;
+  const bool split_fixed = split.mode == PrtStep::Subdivision::Mode::off || split.triangles;
+  const auto& s = step.simplify;
+  const bool simplified = s.off || s.ratio || s.triangles || s.max_error;
+  const auto& target = recipe.promise.target_error;
+  if (step.rays && step.degree && split_fixed && (simplified || !target)) {
+    errors.push_back({"/quality", "leaves nothing to spend: degree, rays, triangles and simplification are given", "",
+                      "a promise, or all of the knobs"});
+  }
+  if (s.max_error && target && *s.max_error > *target) {
+    errors.push_back({std::string(recipe.reduce ? "/steps/1" : "/steps/0") + "/simplify/max_error",
+                      "is more than /quality/target_error", shown(json(*s.max_error)),
+                      "at most " + shown(json(*target))});
+  }
+}
+
 /// A promise is about the certificate, and needs something to spend on.
 void check_promise(const Recipe& recipe, Errors& errors) {
   if (!recipe.promise) return;
@@ -309,10 +327,7 @@ void check_promise(const Recipe& recipe, Errors& errors) {
     errors.push_back(
         {"/quality", "cannot be promised of a transport step: it is baked in one pass", "", "draft, standard, final"});
   }
-  if (recipe.light_field) {
-    errors.push_back(
-        {"/quality", "cannot be promised of a lightfield step: it is baked in one pass", "", "draft, standard, final"});
-  }
+  if (recipe.light_field) check_field_promise(recipe, errors);
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
                       "draft, standard, final"});

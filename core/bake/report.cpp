@@ -319,7 +319,29 @@ ordered_json pass_list(const Passes& passes) {
   return list;
 }
 
-ordered_json promise_object(const Promise& promise, const Passes& passes) {
+ordered_json field_pass_list(const Passes& passes) {
+  ordered_json list = ordered_json::array();
+  for (const PassRecord& p : passes.all()) {
+    const ErrorSources& s = p.sources;
+    list.push_back({{"degree", p.order},
+                    {"rays_of_a_vertex", p.samples},
+                    {"baked_triangles", p.triangles},
+                    {"baked_vertices", p.vertices},
+                    {"rays", p.rays},
+                    {"seconds", p.seconds},
+                    {"relrmse", p.relrmse},
+                    {"interval", {p.low, p.high}},
+                    {"sources",
+                     {{"noise", s.noise},
+                      {"places_and_bands", s.interpolation},
+                      {"last_band", s.truncation.value_or(0)},
+                      {"simplification", s.merging},
+                      {"storage", s.compression}}}});
+  }
+  return list;
+}
+
+ordered_json promise_object(const Promise& promise, const Passes& passes, bool field) {
   constexpr const char* kEndings[] = {"target_met", "time_spent", "floor"};
   ordered_json out;
   if (promise.target_error) out["target_error"] = *promise.target_error;
@@ -327,7 +349,7 @@ ordered_json promise_object(const Promise& promise, const Passes& passes) {
   out["kept"] = passes.kept();
   out["ended_by"] = kEndings[static_cast<int>(passes.outlook().ending)];
   out["reason"] = passes.outlook().reason;
-  out["passes"] = pass_list(passes);
+  out["passes"] = field ? field_pass_list(passes) : pass_list(passes);
   return out;
 }
 
@@ -356,7 +378,8 @@ std::string report_json(const ReportInput& in) {
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.links) out["links"] = links_object(*in.links);
   if (in.recipe.promise)
-    out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in.recipe.promise, in.passes);
+    out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid)
+                             : promise_object(in.recipe.promise, in.passes, in.field.has_value());
   if (in.field) out["lightfield"] = field_object(*in.field);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
   return text_of(out);

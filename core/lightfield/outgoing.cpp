@@ -11,6 +11,7 @@
 #include "core/lightfield/lobe_fits.h"
 #include "core/lightfield/mirrored_sky.h"
 #include "core/lightfield/visibility_fit.h"
+#include "core/mesh/topology.h"
 #include "core/prt/direction_sets.h"
 #include "core/prt/ray_origin.h"
 #include "core/prt/transfer_point.h"
@@ -221,6 +222,16 @@ class VertexBake {
   Vec3f sky_level_;
 };
 
+/// By the area around each vertex.
+double noise_of(const Mesh& mesh, std::span<const VertexResult> vertices) {
+  double squares = 0, sum = 0, all = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const double area = triangle_area(mesh, t);
+    for (const std::uint32_t v : t) squares += area * vertices[v].noise, sum += area * vertices[v].mean, all += area;
+  }
+  return sum > 0 ? std::sqrt(squares / all) / (sum / all) : 0;
+}
+
 /// The blurred skies that those vertices need, and what distances need to know of them.
 void add_sky(const Environment& sky, std::span<const VertexResult> vertices, OutgoingLight& out, Threads& threads) {
   constexpr std::size_t kSlopeLevel = 2;  // alpha .5
@@ -279,10 +290,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
     if (params.progress) params.progress(done, points.size());
   });
   out.rays = rays;
-  double squares = 0, sum = 0;
-  for (const VertexResult& v : results) squares += v.noise, sum += v.mean;
-  const auto n = static_cast<double>(std::max<std::size_t>(1, points.size()));
-  out.noise = sum > 0 ? std::sqrt(squares / n) / (sum / n) : 0;
+  out.noise = noise_of(scene.mesh, results);
   if (vertex.sky_apart()) add_sky(*world.sky, results, out, threads);
   return out;
 }

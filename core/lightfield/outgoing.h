@@ -33,7 +33,7 @@ struct OutgoingBake {
 struct OutgoingLight {
   LightField field;  // of the tracer's mesh
   SkyLevels sky;     // where the field keeps it apart
-  double noise = 0;  // of the rays: root mean square over vertices, eyes and channels, relative to the mean
+  double noise = 0;  // of the rays: root mean square over vertices (by area), eyes and channels, relative to the mean
   std::uint64_t rays = 0;
 };
 

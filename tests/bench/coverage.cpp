@@ -1,8 +1,9 @@
 // How often does a certificate's interval hold the error? Certifies one delivered file again with many seeds, each with
 // points and paths of its own, and takes the mean of their squared errors for the truth: a hundred times the points.
 //   kiln_coverage MODEL.glb OUT/scene.glb [--env NAME] [--seeds 100]      OUT is what `kiln bake MODEL.glb` delivered
-// Two JSON lines, transport error and error under the job's light: truth, share of intervals that hold it, that lie
-// above it and below it, their median width, the spread of the estimate (all relative to the truth), median seconds.
+// Of a light field one JSON line, radiance towards eyes; else two, transport error and error under the job's light:
+// truth, share of intervals that hold it, that lie above it and below it, their median width, the spread of the
+// estimate (all relative to the truth), median seconds.
 
 #include <cmath>
 #include <cstdio>
@@ -16,6 +17,7 @@
 #include "client_cli/models.h"
 #include "client_cli/recipe_input.h"
 #include "core/bake/certificate.h"
+#include "core/bake/light_field_certificate.h"
 #include "tests/bench/bench.h"
 
 namespace kiln {
@@ -84,8 +86,16 @@ Outcome<void> measure(const Asked& asked) {
   KILN_TRY(report, read_text(std::filesystem::path(asked.artefact).replace_filename("report.json").string()));
   const auto rays = json::parse(report).at("rays").get<std::uint64_t>();
   const Tracer truth(scene, threads);
-  std::vector<ErrorStats> transport, job_light;
+  std::vector<ErrorStats> radiance, transport, job_light;
   std::vector<double> seconds;
+  for (std::uint64_t seed = 1; baked.field.vertices() > 0 && seed <= asked.seeds; ++seed) {
+    const FieldCertificate c = certify_field(
+        {.decoded = baked, .truth = truth, .environment = environment, .bake_rays = rays, .seed = seed}, threads);
+    radiance.push_back(c.radiance);
+    seconds.push_back(c.seconds);
+  }
+  print("radiance", radiance, seconds);
+  if (!radiance.empty()) return {};
   for (std::uint64_t seed = 1; seed <= asked.seeds; ++seed) {
     const Certificate c = certify(baked, truth, environment, {.bake_rays = rays, .seed = seed}, threads);
     transport.push_back(c.transport);

@@ -134,7 +134,7 @@ TEST(LightFieldBake, ASeamThatOnlyRoundingHoldsOpenDoesNotTear) {
   const Transfer light{0, 3, true, std::vector<float>(3 * mesh.position.size(), 1.0F)};
   FieldPlan plan;
   plan.simplify.emplace(Simplify{.triangles = 60});
-  const FieldLevels made = make_levels(mesh, light, field, plan, log, threads);
+  const FieldLevels made = make_levels(mesh, light, field, plan, {}, log, threads);
   const Mesh& out = made.levels.front().mesh;
   EXPECT_LE(out.triangles.size(), 60U);
   // Along the common edge both halves have the same places.

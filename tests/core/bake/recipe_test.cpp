@@ -106,6 +106,18 @@ TEST(Recipe, OfRadiosityHasItsOwnParametersAndSurvivesARoundTrip) {
   EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
 }
 
+TEST(Recipe, APromiseOfALightFieldNeedsSomethingToSpend) {
+  EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"lightfield","degree":4,"rays":64}]})"));
+  const std::string fixed = R"("steps":[{"do":"lightfield","degree":4,"rays":64,"subdivide":"off")";
+  EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},)" + fixed + "}]}"));  // simplification is left
+  EXPECT_EQ(pointers(R"({"quality":{"time_budget_s":9},)" + fixed + "}]}"), std::vector<std::string>{"/quality"});
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},)" + fixed + R"(,"simplify":"off"}]})"),
+            std::vector<std::string>{"/quality"});
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"reduce"},
+                         {"do":"lightfield","simplify":{"max_error":0.2}}]})"),
+            std::vector<std::string>{"/steps/1/simplify/max_error"});
+}
+
 TEST(Recipe, PromisesNothingOfRadiosity) {
   EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity"}]})"),
             (std::vector<std::string>{"/quality"}));
