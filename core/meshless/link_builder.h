@@ -7,11 +7,9 @@
 //     among senders, and more for vertices that read there.
 //  3. Finer points on the side of the vertex normals gather where one of kProbes lamps in free places lights a point
 //     otherwise than the points before it predict: by more than eps times the mean light of that lamp.
-//  4. After so many sweeps (at most kMostLinkSweeps) what is left of the lamps' light is taken for a geometric series,
-//     whose factor is steady by then: the doubt in it is below a thousandth of the light.
+//  4. After so many sweeps what is left of the lamps' light is taken for a geometric series (link_sweeps.h).
 //  5. Vertices read the receivers around them that they see (reading.h); one without any takes the nearest sender that
-//  it
-//     sees, and gathers for itself where there is none.
+//     it sees, and gathers for itself where there is none.
 // Paper   Lehtinen et al. 2007, section 6.5.   Differs  receivers are refined by what lamps do, not by the kernel
 // alone;
 //         one flat set of receivers is read by Shepard weights, as in radiosity.h, instead of splatting the hierarchy
@@ -45,8 +43,7 @@ struct LinkParams {
   std::function<void(std::string_view stage)> stage = {};  // told as each begins: points, rows, receivers
 };
 
-inline constexpr int kProbes = 12, kFewestLinkSweeps = 4, kMostLinkSweeps = 48;
-inline constexpr double kLinkTail = 1e-3;
+inline constexpr int kProbes = 12;
 inline constexpr std::uint32_t kMostSenders = 48000;  // so that nodes fit 16 bits
 
 struct LinkStats {
