@@ -3,7 +3,10 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <vector>
 
 namespace kiln {
@@ -23,6 +26,17 @@ bool lock_file(int fd, const std::filesystem::path& name) {
   struct stat opened {
   }, named{};
   return ::fstat(fd, &opened) == 0 && ::stat(name.c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+}
+
+std::string unique_name() {
+  static std::atomic<std::uint64_t> count{0};
+  static const std::string machine = [] {
+    std::string name(64, '\0');
+    if (::gethostname(name.data(), name.size()) != 0) name.clear();
+    return name.substr(0, name.find('\0'));
+  }();
+  const auto now = std::chrono::system_clock::now().time_since_epoch().count();
+  return machine + "." + std::to_string(::getpid()) + "." + std::to_string(now) + "." + std::to_string(count++);
 }
 
 Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder) {

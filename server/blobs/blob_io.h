@@ -26,6 +26,9 @@ auto retry_interrupted(Call&& call) {
 /// Locks an open file if nobody else has, and if it still is the one of that name.
 bool lock_file(int fd, const std::filesystem::path& name);
 
+/// Unique among the machines that may share a folder.
+std::string unique_name();
+
 /// Makes the names in a folder durable.
 Result<void> sync_folder(FileLayer& files, const std::filesystem::path& folder);
 

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kCountEvery = 16u << 20;  // bytes that a power cut may cost a long piece
-constexpr const char *kBytes = "", *kInfo = ".info", *kDone = ".done", *kNew = ".new";
+constexpr const char *kBytes = "", *kInfo = ".info", *kDone = ".done", *kNew = ".new.";
 
 tl::unexpected<Fault> unknown() { return fault("not_found", "there is no such upload, or it is over"); }
 
@@ -171,11 +171,12 @@ Result<PartialUpload> PartialUploads::read_record(const fs::path& name) const {
   return upload;
 }
 
-/// Beside the old one, and then in its place.
+/// Beside the old one, and then in its place. Two may do so at once: what they write of a whole upload is the same.
 Result<void> PartialUploads::write_record(const PartialUpload& upload) {
   FileLayer& files = blobs_->files();
-  const fs::path fresh = file(upload.id, kNew), name = file(upload.id, upload.done ? kDone : kInfo);
-  const int fd = retry_interrupted([&] { return files.open(fresh, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW, 0600); });
+  const fs::path fresh = file(upload.id, (kNew + unique_name()).c_str()),
+                 name = file(upload.id, upload.done ? kDone : kInfo);
+  const int fd = retry_interrupted([&] { return files.open(fresh, O_WRONLY | O_CREAT | O_EXCL, 0600); });
   if (fd < 0) return io_fault(errno, "write the record of an upload");
   HeldFile held(files, fd);
   const std::string text = text_of(upload);
@@ -183,7 +184,10 @@ Result<void> PartialUploads::write_record(const PartialUpload& upload) {
   if (error == 0 && files.fsync(fd) != 0) error = errno;
   held.close();
   if (error == 0 && files.rename(fresh, name) != 0) error = errno;
-  if (error != 0) return io_fault(error, "write the record of an upload");
+  if (error != 0) {
+    files.unlink(fresh);
+    return io_fault(error, "write the record of an upload");
+  }
   return sync_folder(files, blobs_->folder() / "tmp");
 }
 
@@ -210,9 +214,13 @@ Result<PartialUpload> PartialUploads::begin(const PartialUpload& wanted) {
 
 Result<PartialUpload> PartialUploads::find(const std::string& id, const std::string& tenant) const {
   if (!is_id(id)) return unknown();
-  auto upload = read_record(file(id, kDone));
-  const bool done = upload.has_value();
-  if (!upload && upload.error().code == "not_found") upload = read_record(file(id, kInfo));
+  Result<PartialUpload> upload = unknown();
+  bool done = false;
+  for (const char* suffix : {kDone, kInfo, kDone}) {  // again: it may become a blob between the looks
+    upload = read_record(file(id, suffix));
+    done = suffix == kDone;
+    if (upload || upload.error().code != "not_found") break;
+  }
   if (!upload) return upload;
   if (upload->tenant != tenant) return unknown();
   upload->id = id;
@@ -237,9 +245,10 @@ Result<PieceWriter> PartialUploads::append(const PartialUpload& wanted, std::uin
 
 Result<StoredBlob> PartialUploads::store(const PartialUpload& whole) {
   KILN_TRY(fd, open_locked(whole.id, 0));
-  if (fd < 0) {  // it went into the store, and then the server died
-    if (whole.sha256.empty() || !blobs_->exists(whole.sha256)) return unknown();
-    return StoredBlob{whole.sha256, whole.length, true};
+  if (fd < 0) {  // it went into the store, and then the server died or somebody else is about to say so
+    KILN_TRY(now, find(whole.id, whole.tenant));
+    if (now.sha256.empty() || !blobs_->exists(now.sha256)) return unknown();
+    return StoredBlob{now.sha256, now.length, true};
   }
   HeldFile held(blobs_->files(), fd);
   const fs::path name = file(whole.id, kBytes);

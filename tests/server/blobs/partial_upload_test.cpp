@@ -3,6 +3,8 @@
 #include "server/blobs/partial_upload.h"
 
 #include <fstream>
+#include <functional>
+#include <utility>
 
 #include "tests/server/blobs/blob_conformance.h"
 #include "tests/server/blobs/faulty_files.h"
@@ -124,6 +126,62 @@ TEST_P(BlobConformance, AnUploadInPiecesIsItsTenantsAndExpires) {
   store().expire_partials(0);
   EXPECT_EQ(spooled(), 0U);
   EXPECT_EQ(uploads.find(upload.id, "studio").error().code, "not_found");
+}
+
+TEST_P(BlobConformance, TwoMayCompleteAnUploadInPiecesAtOnce) {
+  PartialUploads uploads(store());
+  const PartialUpload whole = send(uploads, uploads.begin(wanted()).value(), 0, kText.size()).value();
+  const StoredBlob blob = uploads.store(whole).value();
+  const auto again = uploads.store(whole);  // by somebody who looked at it before
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->sha256, blob.sha256);
+  EXPECT_TRUE(uploads.finish(whole, blob.sha256));
+  EXPECT_EQ(uploads.store(whole)->sha256, blob.sha256);
+  EXPECT_TRUE(uploads.finish(whole, blob.sha256));
+}
+
+/// Does something else just before a file is opened or renamed.
+class Interrupted final : public FileLayer {
+ public:
+  std::function<void()> before_open, before_rename;
+  std::string opened;  // suffix of the file
+  int open(const std::string& path, int flags, unsigned mode) override {
+    if (before_open && path.ends_with(opened)) std::exchange(before_open, nullptr)();
+    return FileLayer::open(path, flags, mode);
+  }
+  int rename(const std::string& from, const std::string& to) override {
+    if (before_rename) std::exchange(before_rename, nullptr)();
+    return FileLayer::rename(from, to);
+  }
+};
+
+class PieceRace : public BlobTest {};
+
+TEST_F(PieceRace, AnUploadThatBecomesItsBlobMeanwhileIsFound) {
+  Interrupted files;
+  const auto blobs = open_file_blobs(folder_, files).value();
+  PartialUploads uploads(*blobs);
+  const PartialUpload whole = send(uploads, uploads.begin(wanted()).value(), 0, kText.size()).value();
+  const StoredBlob blob = uploads.store(whole).value();
+  files.opened = ".info";
+  files.before_open = [&] { EXPECT_TRUE(uploads.finish(whole, blob.sha256)); };
+  const auto found = uploads.find(whole.id, "studio");
+  EXPECT_FALSE(files.before_open);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_TRUE(found->done);
+}
+
+TEST_F(PieceRace, TwoMayWriteTheLastRecordOfAnUploadAtOnce) {
+  Interrupted files;
+  const auto blobs = open_file_blobs(folder_, files).value();
+  PartialUploads uploads(*blobs);
+  const PartialUpload whole = send(uploads, uploads.begin(wanted()).value(), 0, kText.size()).value();
+  const StoredBlob blob = uploads.store(whole).value();
+  files.before_rename = [&] { EXPECT_TRUE(uploads.finish(whole, blob.sha256)); };
+  const auto finished = uploads.finish(whole, blob.sha256);
+  EXPECT_TRUE(finished) << finished.error().message;
+  EXPECT_TRUE(uploads.find(whole.id, "studio")->done);
+  EXPECT_EQ(files_in(folder_ / "tmp"), 1U);
 }
 
 class PieceCrash : public BlobTest {
