@@ -5,11 +5,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <string_view>
 #include <utility>
 
+#include "core/base/expects.h"
 #include "server/blobs/blob_io.h"
 
 namespace kiln {
@@ -17,24 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPartial = "part.";  // tmp/part.<sha256>: a named upload that may be resumed
+constexpr std::string_view kPartial = "part.";  // tmp/part.<sha256>.<tenant>: a named upload that may be resumed
 
 /// A named upload, or one that comes in pieces (partial_upload.h).
 bool is_partial(const fs::path& file) {
   const std::string name = file.filename();
   return name.starts_with(kPartial) || name.starts_with("up.");
-}
-
-/// Unique among the machines that may share the folder.
-std::string random_name() {
-  static std::atomic<std::uint64_t> count{0};
-  static const std::string machine = [] {
-    std::string name(64, '\0');
-    if (::gethostname(name.data(), name.size()) != 0) name.clear();
-    return name.substr(0, name.find('\0'));
-  }();
-  const auto now = std::chrono::system_clock::now().time_since_epoch().count();
-  return machine + "." + std::to_string(::getpid()) + "." + std::to_string(now) + "." + std::to_string(count++);
 }
 
 }  // namespace
@@ -43,12 +31,13 @@ bool is_sha256(const std::string& text) {
   return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-fs::path BlobStore::part_of(const std::string& sha256) const {
-  return folder_ / "tmp" / (std::string(kPartial) + sha256);
+fs::path BlobStore::part_of(const std::string& sha256, const std::string& tenant) const {
+  EXPECTS(tenant.find('/') == std::string::npos);
+  return folder_ / "tmp" / (std::string(kPartial) + sha256 + (tenant.empty() ? "" : "." + tenant));
 }
 
 Result<BlobWriter> BlobStore::write() {
-  fs::path tmp = folder_ / "tmp" / ("new." + random_name());
+  fs::path tmp = folder_ / "tmp" / ("new." + unique_name());
   const int fd = retry_interrupted([&] { return files_->open(tmp, O_WRONLY | O_CREAT | O_EXCL, 0600); });
   if (fd < 0) return io_fault(errno, "begin a blob");
   BlobWriter writer(*this, tmp, fd, "");
@@ -56,21 +45,21 @@ Result<BlobWriter> BlobStore::write() {
   return writer;
 }
 
-std::uint64_t BlobStore::partial_bytes(const std::string& sha256) const {
+std::uint64_t BlobStore::partial_bytes(const std::string& sha256, const std::string& tenant) const {
   std::error_code none;
-  const auto size = is_sha256(sha256) ? fs::file_size(part_of(sha256), none) : 0;
+  const auto size = is_sha256(sha256) ? fs::file_size(part_of(sha256, tenant), none) : 0;
   return none ? 0 : size;
 }
 
-Result<BlobWriter> BlobStore::write_named(const std::string& sha256, std::uint64_t offset) {
+Result<BlobWriter> BlobStore::write_named(const std::string& sha256, std::uint64_t offset, const std::string& tenant) {
   if (!is_sha256(sha256))
     return fault("hash_mismatch", "the name of an asset is its SHA-256 as 64 lower-case hex digits");
-  const fs::path tmp = part_of(sha256);
+  const fs::path tmp = part_of(sha256, tenant);
   const int fd = retry_interrupted([&] { return files_->open(tmp, O_RDWR | O_CREAT | O_APPEND, 0600); });
   if (fd < 0) return io_fault(errno, "begin a blob");
   BlobWriter writer(*this, tmp, fd, sha256);  // closes the file on every way out
   if (!lock_file(fd, tmp)) return fault("upload_busy", "another upload of this asset is running");
-  const std::uint64_t kept = partial_bytes(sha256);
+  const std::uint64_t kept = partial_bytes(sha256, tenant);
   if (offset != 0 && offset != kept) {
     return fault("offset_mismatch", "the upload goes on at byte " + std::to_string(kept), sha256);
   }

@@ -55,11 +55,12 @@ class BlobStore {
 
   /// A writer of bytes whose hash is not known yet.
   Result<BlobWriter> write();
-  /// A writer of the blob `sha256` from `offset` on, which must be partial_bytes(sha256) ("offset_mismatch") or 0
-  /// (starts anew). One at a time ("upload_busy").
-  Result<BlobWriter> write_named(const std::string& sha256, std::uint64_t offset = 0);
-  /// How much of an interrupted named upload is kept in this spool.
-  std::uint64_t partial_bytes(const std::string& sha256) const;
+  /// A writer of the blob `sha256` from `offset` on, which must be partial_bytes() of the same tenant
+  /// ("offset_mismatch") or 0 (starts anew). One of a tenant at a time ("upload_busy"). Nobody goes on with the bytes
+  /// of another tenant: whoever knew a hash and the last bytes of a file would have all of it. A tenant is a word.
+  Result<BlobWriter> write_named(const std::string& sha256, std::uint64_t offset = 0, const std::string& tenant = "");
+  /// How much of a tenant's interrupted named upload is kept in this spool.
+  std::uint64_t partial_bytes(const std::string& sha256, const std::string& tenant = "") const;
   /// Removes files of anonymous writers that are gone. Returns how many went.
   int remove_dead_writers();
   /// Removes named uploads, and files of those in pieces, that nobody writes and that are older than `age_s`. Returns
@@ -97,7 +98,7 @@ class BlobStore {
   friend class BlobWriter;
   friend class PartialUploads;
   friend class PieceWriter;
-  std::filesystem::path part_of(const std::string& sha256) const;
+  std::filesystem::path part_of(const std::string& sha256, const std::string& tenant) const;
   int remove_unlocked(const std::function<bool(const std::filesystem::directory_entry&)>& chosen);
   std::filesystem::path folder_;
   FileLayer* files_;

@@ -64,7 +64,7 @@ Reply known_asset(Service& service, Request& request, const std::string& sha256)
 }
 
 Reply with_offset(Reply reply, Service& service, const std::string& sha256) {
-  reply.fields.push_back({"upload-offset", std::to_string(service.asset_offset(sha256))});
+  reply.fields.push_back({"upload-offset", std::to_string(service.asset_offset(sha256, ""))});
   return reply;
 }
 

@@ -117,7 +117,9 @@ class LocalService final : public Service {
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
-  std::uint64_t asset_offset(const std::string& sha256) override { return blobs_->partial_bytes(sha256); }
+  std::uint64_t asset_offset(const std::string& sha256, const std::string& tenant) override {
+    return blobs_->partial_bytes(sha256, tenant);
+  }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs_->open_blob(sha256); }
 
   Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
@@ -337,7 +339,8 @@ Result<std::unique_ptr<UploadPiece>> LocalService::append_upload(const PartialUp
 Result<std::unique_ptr<AssetUpload>> LocalService::put_asset(const AssetRequest& request) {
   if (bus_.closed()) return draining();
   if (auto room = check_room(request.expected); !room) return tl::make_unexpected(room.error());
-  KILN_TRY(writer, request.sha256.empty() ? blobs_->write() : blobs_->write_named(request.sha256, request.offset));
+  KILN_TRY(writer, request.sha256.empty() ? blobs_->write()
+                                          : blobs_->write_named(request.sha256, request.offset, request.tenant));
   return std::make_unique<LocalUpload>(*this, std::move(writer), request.tenant);
 }
 

@@ -153,7 +153,7 @@ class Service {
   /// Whether the tenant has it; without one: whether anybody has.
   virtual bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) = 0;
   /// Where an interrupted upload of `sha256` goes on.
-  virtual std::uint64_t asset_offset(const std::string& sha256) = 0;
+  virtual std::uint64_t asset_offset(const std::string& sha256, const std::string& tenant) = 0;
   virtual Result<BlobReader> open_asset(const std::string& sha256) = 0;
 
   /// Uploads in pieces; see UploadDesk. `wanted` has length, metadata, and expected if it is known.

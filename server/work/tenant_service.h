@@ -41,7 +41,9 @@ class TenantService final : public Service {
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) override;
-  std::uint64_t asset_offset(const std::string& sha256) override { return all_.asset_offset(sha256); }
+  std::uint64_t asset_offset(const std::string& sha256, const std::string&) override {
+    return all_.asset_offset(sha256, tenant_);
+  }
   Result<BlobReader> open_asset(const std::string& sha256) override;
   Result<PartialUpload> begin_upload(const PartialUpload& wanted) override;
   Result<PartialUpload> find_upload(const std::string& id, const std::string&) override {

@@ -115,6 +115,20 @@ TEST_P(BlobConformance, OneUploadOfANameAtATime) {
   EXPECT_TRUE(store().write_named(sha256));
 }
 
+TEST_P(BlobConformance, NobodyGoesOnWithTheBytesOfAnotherTenant) {
+  const std::string text = "a scene that ends in zeros 0000";
+  const std::string sha256 = sha256_hex(bytes_of(text));
+  const std::size_t most = text.size() - 4;
+  { EXPECT_TRUE(store().write_named(sha256, 0, "a")->write(bytes_of(text.substr(0, most)))); }
+  EXPECT_EQ(store().partial_bytes(sha256, "b"), 0U);
+  EXPECT_EQ(store().write_named(sha256, most, "b").error().code, "offset_mismatch");
+  EXPECT_EQ(store().write_named(sha256, most).error().code, "offset_mismatch");
+  EXPECT_EQ(store().partial_bytes(sha256, "a"), most);
+  auto writer = store().write_named(sha256, most, "a").value();
+  EXPECT_TRUE(writer.write(bytes_of(text.substr(most))));
+  EXPECT_TRUE(writer.finish());
+}
+
 TEST_P(BlobConformance, NamesThatAreNoHashFindNothing) {
   for (const std::string& name : {std::string("../../etc/passwd"), std::string(64, 'A'), std::string(63, 'a')}) {
     EXPECT_EQ(store().open_blob(name).error().code, "not_found");

@@ -270,7 +270,8 @@ Result<OpenArtifact> FakeService::open_artifact(const std::string& id, const std
 }
 
 Result<std::unique_ptr<AssetUpload>> FakeService::put_asset(const AssetRequest& request) {
-  auto writer = request.sha256.empty() ? blobs().write() : blobs().write_named(request.sha256, request.offset);
+  auto writer =
+      request.sha256.empty() ? blobs().write() : blobs().write_named(request.sha256, request.offset, request.tenant);
   if (!writer) return tl::make_unexpected(writer.error());
   return std::unique_ptr<AssetUpload>(std::make_unique<FakeUpload>(std::move(*writer)));
 }

@@ -47,7 +47,9 @@ class FakeService : public Service {
   bool has_asset(const std::string& sha256, const std::optional<std::string>&) override {
     return blobs().exists(sha256);
   }
-  std::uint64_t asset_offset(const std::string& sha256) override { return blobs().partial_bytes(sha256); }
+  std::uint64_t asset_offset(const std::string& sha256, const std::string& tenant) override {
+    return blobs().partial_bytes(sha256, tenant);
+  }
   Result<BlobReader> open_asset(const std::string& sha256) override { return blobs().open_blob(sha256); }
   Result<PartialUpload> begin_upload(const PartialUpload& wanted) override { return desk().begin(wanted); }
   Result<PartialUpload> find_upload(const std::string& id, const std::string& tenant) override {

@@ -198,7 +198,7 @@ TEST_F(ServiceTest, AStartRemovesWhatADeadServerLeft) {
   open();
   EXPECT_EQ(entries("work"), 0U);
   EXPECT_EQ(entries("tmp"), 1U);
-  EXPECT_EQ(service_->asset_offset(std::string(64, 'a')), 13U);
+  EXPECT_EQ(service_->asset_offset(std::string(64, 'a'), ""), 13U);
 }
 
 TEST_F(ServiceTest, ANearlyFullDiskRefusesUploadsAndLetsTheQueueWait) {

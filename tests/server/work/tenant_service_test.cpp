@@ -2,6 +2,7 @@
 
 #include "server/work/tenant_service.h"
 
+#include "core/base/sha256.h"
 #include "tests/server/work/service_fixture.h"
 
 namespace kiln::testing {
@@ -53,6 +54,25 @@ TEST_F(TenantTest, AnothersAssetCannotBeReadUsedOrSeenToBeThere) {
   stolen.scene_sha256 = sha256;
   EXPECT_EQ(b_.submit(stolen).error().code, "asset_not_found");
   EXPECT_EQ(b_.plan(stolen).error().code, "asset_not_found");
+}
+
+TEST_F(TenantTest, AnothersHalfOfANamedUploadIsNeitherSeenNorGoneOnWithNorInTheWay) {
+  const std::string text = "a secret scene that ends in zeros 0000";
+  const auto bytes = [&](std::size_t from, std::size_t count) {
+    return std::span(reinterpret_cast<const std::uint8_t*>(text.data()) + from, count);
+  };
+  const std::size_t half = text.size() - 4;
+  const std::string sha256 = sha256_hex(bytes(0, text.size()));
+  ASSERT_TRUE(a_.put_asset({sha256, 0, half}).value()->write(bytes(0, half)));
+  EXPECT_EQ(b_.asset_offset(sha256, ""), 0U);
+  EXPECT_EQ(b_.put_asset({sha256, half, 4}).error().code, "offset_mismatch");
+  { ASSERT_TRUE(b_.put_asset({sha256, 0, 5}).value()->write(bytes(0, 5))); }
+  EXPECT_EQ(b_.asset_offset(sha256, ""), 5U);
+  EXPECT_EQ(a_.asset_offset(sha256, ""), half);
+  auto rest = a_.put_asset({sha256, half, 4}).value();
+  ASSERT_TRUE(rest->write(bytes(half, 4)));
+  EXPECT_EQ(rest->finish()->sha256, sha256);
+  EXPECT_FALSE(b_.open_asset(sha256));
 }
 
 TEST_F(TenantTest, TheSameSceneAndRecipeIsBakedForEachAndAnsweredFromTheOwnResult) {
