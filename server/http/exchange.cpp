@@ -167,15 +167,16 @@ Reply Exchange::take_body(const Handler& handler, Request& request, Visitor* vis
     Service& service;
     const AccessToken& token;
     const BodySource& body;
+    std::int64_t day;
     ~Charge() {
       const std::uint64_t missing = body.length() - body.taken();
-      if (missing > 0) static_cast<void>(service.refund_upload(token.tenant, missing));
+      if (missing > 0) static_cast<void>(service.refund_upload(token.tenant, missing, day));
     }
   };
   const AccessToken& token = visitor->token;
   const auto charged = visitor->service.charge_upload(token.tenant, request.body->length(), token.max_daily_bytes);
   if (!charged) return problem_reply(problem_of(charged.error()));
-  const Charge charge{visitor->service, token, *request.body};
+  const Charge charge{visitor->service, token, *request.body, *charged};
   return handler(request);
 }
 

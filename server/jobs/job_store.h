@@ -158,10 +158,10 @@ class JobStore {
   virtual Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count = false) = 0;
 
   /// Adds to what the tenant uploaded today (UTC, the store's day). "daily_quota", and nothing added, when that would
-  /// be more than `limit` (0: none).
-  virtual Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
-  /// Takes back what was charged and did not come.
-  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) = 0;
+  /// be more than `limit` (0: none). The day, counted from 1970.
+  virtual Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
+  /// Takes back what was charged on that day and did not come.
+  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) = 0;
 
   /// Among those who make blobs; waits while somebody removes some.
   virtual Result<std::unique_ptr<BlobGate>> enter_blob_gate() = 0;

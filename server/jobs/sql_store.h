@@ -47,8 +47,8 @@ class SqlStore final : public JobStore {
   Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) override;
   Result<void> pin_blob(const std::string& sha256, const std::string& tenant, bool pinned) override;
   Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count) override;
-  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
-  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override;
+  Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) override;
   Result<std::string> identity() override;
   Result<void> check_writable() override;
 

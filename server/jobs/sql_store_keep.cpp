@@ -106,22 +106,22 @@ Result<std::vector<std::string>> SqlStore::forget_unused_blobs(Millis grace, boo
   });
 }
 
-Result<void> SqlStore::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
-  return write([&](Connection& db, std::int64_t now) -> Result<void> {
+Result<std::int64_t> SqlStore::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
+  return write([&](Connection& db, std::int64_t now) -> Result<std::int64_t> {
     const std::int64_t day = now / kDayMs;
     KILN_DO(db.run("DELETE FROM upload_day WHERE tenant=? AND day<?", tenant, day));
     KILN_TRY(rows, db.query("INSERT INTO upload_day VALUES(?,?,?) ON CONFLICT(tenant, day) DO UPDATE SET "
                             "bytes=upload_day.bytes+excluded.bytes RETURNING bytes",
                             tenant, day, bytes));
-    if (limit == 0 || static_cast<std::uint64_t>(rows.front().integer(0)) <= limit) return {};
+    if (limit == 0 || static_cast<std::uint64_t>(rows.front().integer(0)) <= limit) return day;
     return fault("daily_quota", "this tenant may upload " + std::to_string(limit) + " bytes a day");
   });
 }
 
-Result<void> SqlStore::refund_upload(const std::string& tenant, std::uint64_t bytes) {
-  return write([&](Connection& db, std::int64_t now) -> Result<void> {
+Result<void> SqlStore::refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) {
+  return write([&](Connection& db, std::int64_t) -> Result<void> {
     KILN_DO(db.run("UPDATE upload_day SET bytes=CASE WHEN bytes<? THEN 0 ELSE bytes-? END WHERE tenant=? AND day=?",
-                   bytes, bytes, tenant, now / kDayMs));
+                   bytes, bytes, tenant, day));
     return {};
   });
 }

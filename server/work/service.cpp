@@ -107,11 +107,11 @@ class LocalService final : public Service {
   Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) override {
     return store_->pin_blob(sha256, tenant, pinned);
   }
-  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
+  Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
     return store_->charge_upload(tenant, bytes, limit);
   }
-  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override {
-    return store_->refund_upload(tenant, bytes);
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) override {
+    return store_->refund_upload(tenant, bytes, day);
   }
 
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;

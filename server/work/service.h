@@ -164,8 +164,8 @@ class Service {
   virtual Result<void> remove_upload(const std::string& id, const std::string& tenant) = 0;
 
   /// Counts what a tenant uploads a day; see JobStore.
-  virtual Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
-  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) = 0;
+  virtual Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) = 0;
+  virtual Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) = 0;
 
   virtual ServiceStats stats() = 0;
   /// Whether the service can take work, thing by thing.

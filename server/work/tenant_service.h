@@ -32,11 +32,11 @@ class TenantService final : public Service {
   Result<void> pin_asset(const std::string& sha256, const std::string&, bool pinned) override {
     return all_.pin_asset(sha256, tenant_, pinned);
   }
-  Result<void> charge_upload(const std::string&, std::uint64_t bytes, std::uint64_t limit) override {
+  Result<std::int64_t> charge_upload(const std::string&, std::uint64_t bytes, std::uint64_t limit) override {
     return all_.charge_upload(tenant_, bytes, limit);
   }
-  Result<void> refund_upload(const std::string&, std::uint64_t bytes) override {
-    return all_.refund_upload(tenant_, bytes);
+  Result<void> refund_upload(const std::string&, std::uint64_t bytes, std::int64_t day) override {
+    return all_.refund_upload(tenant_, bytes, day);
   }
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;

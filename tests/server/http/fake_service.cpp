@@ -246,14 +246,14 @@ Result<void> FakeService::pin_asset(const std::string& sha256, const std::string
   return {};
 }
 
-Result<void> FakeService::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
+Result<std::int64_t> FakeService::charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) {
   const std::lock_guard lock(mutex_);
   if (limit > 0 && uploaded_[tenant] + bytes > limit) return fault("daily_quota", "that is enough for today");
   uploaded_[tenant] += bytes;
-  return {};
+  return 1;
 }
 
-Result<void> FakeService::refund_upload(const std::string& tenant, std::uint64_t bytes) {
+Result<void> FakeService::refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t) {
   const std::lock_guard lock(mutex_);
   uploaded_[tenant] -= bytes;
   return {};

@@ -40,8 +40,8 @@ class FakeService : public Service {
   Result<std::vector<JobEvent>> history(const std::string& id) override;
   Result<Job> pin(const std::string& id, bool pinned) override;
   Result<void> pin_asset(const std::string& sha256, const std::string& tenant, bool pinned) override;
-  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
-  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override;
+  Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override;
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) override;
   Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) override;
   Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) override;
   bool has_asset(const std::string& sha256, const std::optional<std::string>&) override {

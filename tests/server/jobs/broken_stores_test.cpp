@@ -112,11 +112,11 @@ class BrokenStore final : public JobStore {
   Result<void> pin_blob(const std::string& sha, const std::string& tenant, bool pinned) override {
     return store_->pin_blob(sha, tenant, pinned);
   }
-  Result<void> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
+  Result<std::int64_t> charge_upload(const std::string& tenant, std::uint64_t bytes, std::uint64_t limit) override {
     return store_->charge_upload(tenant, bytes, flaw_ == Flaw::free_uploads ? 0 : limit);
   }
-  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes) override {
-    return store_->refund_upload(tenant, bytes);
+  Result<void> refund_upload(const std::string& tenant, std::uint64_t bytes, std::int64_t day) override {
+    return store_->refund_upload(tenant, bytes, day);
   }
   Result<std::unique_ptr<BlobGate>> enter_blob_gate() override { return store_->enter_blob_gate(); }
   Result<std::unique_ptr<BlobGate>> close_blob_gate() override {

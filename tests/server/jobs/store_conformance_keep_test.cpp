@@ -83,16 +83,19 @@ TEST_P(StoreConformance, APinnedBlobIsKeptWithoutAJobAndEachTenantHasItsOwnPin) 
 
 TEST_P(StoreConformance, ATenantUploadsSoMuchADayAndAnotherIsNotHeldUp) {
   clock_.now_ms = 20'000 * kDay.count() + 1000;
-  EXPECT_TRUE(store().charge_upload("busy", 60, 100));
+  const std::int64_t day = store().charge_upload("busy", 60, 100).value();
   EXPECT_TRUE(store().charge_upload("busy", 40, 100)) << "all of it may be used";
   EXPECT_EQ(code_of(store().charge_upload("busy", 1, 100)), "daily_quota");
   EXPECT_TRUE(store().charge_upload("calm", 100, 100));
-  EXPECT_TRUE(store().refund_upload("busy", 30)) << "that did not come";
+  EXPECT_TRUE(store().refund_upload("busy", 30, day)) << "that did not come";
   EXPECT_EQ(code_of(store().charge_upload("busy", 31, 100)), "daily_quota") << "and what was refused is not counted";
   EXPECT_TRUE(store().charge_upload("busy", 30, 100));
   clock_.now_ms += kDay.count();
   EXPECT_TRUE(store().charge_upload("busy", 100, 100)) << "the next day";
-  EXPECT_TRUE(store().refund_upload("busy", 1000)) << "never below nothing";
+  EXPECT_TRUE(store().refund_upload("busy", 100, day));
+  EXPECT_EQ(code_of(store().charge_upload("busy", 1, 100)), "daily_quota")
+      << "what was charged yesterday is yesterday's";
+  EXPECT_TRUE(store().refund_upload("busy", 1000, day + 1)) << "never below nothing";
   EXPECT_TRUE(store().charge_upload("busy", 100, 100));
   EXPECT_EQ(code_of(store().charge_upload("busy", 1, 100)), "daily_quota");
   EXPECT_TRUE(store().charge_upload("busy", 1'000'000'000'000, 0)) << "0: no limit";
