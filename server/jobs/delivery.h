@@ -38,7 +38,8 @@ class DeliveryQueue {
   /// Asked for the first time, the mark is at the newest event: what was before is nobody's news.
   virtual Result<DeliveryMark> mark() = 0;
   /// Adds deliveries and moves the mark from `from` to `to`, both or neither. lost: another program moved it before.
-  virtual Result<Wrote> add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery>) = 0;
+  /// Older ones than `longest` go, tried or not: a receiver that hangs or is named no more leaves no growing heap.
+  virtual Result<Wrote> add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery>, Millis longest) = 0;
   /// Of those that are due for this receiver the one that is due longest. It is due again after `lease`.
   virtual Result<std::optional<Delivery>> take(const std::string& receiver, Millis lease) = 0;
   /// Delivered, or given up.

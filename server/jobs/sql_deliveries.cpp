@@ -23,13 +23,15 @@ Result<DeliveryMark> SqlDeliveries::mark() {
   return mark;
 }
 
-Result<Wrote> SqlDeliveries::add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery> deliveries) {
+Result<Wrote> SqlDeliveries::add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery> deliveries,
+                                 Millis longest) {
   Wrote wrote = Wrote::lost;
   KILN_DO(engine_.write([&](Connection& db) -> Result<void> {
     wrote = Wrote::lost;
     KILN_TRY(now, db.now_ms());
     KILN_TRY(moved, db.run("UPDATE counter SET value=? WHERE name='delivery' AND value=?", to, from));
     if (moved == 0) return {};
+    KILN_DO(db.run("DELETE FROM delivery WHERE created_at<?", now - longest.count()));
     for (const NewDelivery& delivery : deliveries) {
       KILN_DO(
           db.run("INSERT INTO delivery(message, receiver, body, created_at, due_at) VALUES(?,?,?,?,?) "

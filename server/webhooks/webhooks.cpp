@@ -117,7 +117,7 @@ Result<bool> Webhooks::plan() {
       if (hears(receiver, job)) deliveries.push_back({message, receiver.url, webhook_message(event, job)});
     }
   }
-  KILN_TRY(added, store_.deliveries().add(mark.event, events.back().id, deliveries));
+  KILN_TRY(added, store_.deliveries().add(mark.event, events.back().id, deliveries, options_.longest));
   static_cast<void>(added);  // lost: another server did it
   return true;
 }

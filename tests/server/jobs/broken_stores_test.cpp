@@ -34,8 +34,8 @@ class HastyDeliveries final : public DeliveryQueue {
  public:
   explicit HastyDeliveries(DeliveryQueue& queue) : queue_(queue) {}
   Result<DeliveryMark> mark() override { return queue_.mark(); }
-  Result<Wrote> add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery> all) override {
-    return queue_.add(from, to, all);
+  Result<Wrote> add(std::uint64_t from, std::uint64_t to, std::span<const NewDelivery> all, Millis longest) override {
+    return queue_.add(from, to, all, longest);
   }
   Result<std::optional<Delivery>> take(const std::string& receiver, Millis) override {
     return queue_.take(receiver, Millis(0));

@@ -5,7 +5,7 @@
 namespace kiln::testing {
 namespace {
 
-constexpr Millis kLease{30'000};
+constexpr Millis kLease{30'000}, kLongest{3'600'000};
 
 NewDelivery delivery(const std::string& message, const std::string& receiver = "https://a/") {
   return {message, receiver, "{\"id\":\"" + message + "\"}"};
@@ -14,7 +14,7 @@ NewDelivery delivery(const std::string& message, const std::string& receiver = "
 /// As if the events up to the newest had been looked through.
 void add(JobStore& store, std::vector<NewDelivery> all) {
   const DeliveryMark mark = store.deliveries().mark().value();
-  ASSERT_EQ(store.deliveries().add(mark.event, mark.event + 1, all).value(), Wrote::done);
+  ASSERT_EQ(store.deliveries().add(mark.event, mark.event + 1, all, kLongest).value(), Wrote::done);
 }
 
 std::string taken(JobStore& store, const std::string& receiver = "https://a/") {
@@ -33,8 +33,8 @@ TEST_P(StoreDeliveries, TheFirstMarkIsTheNewestEvent) {
 TEST_P(StoreDeliveries, OneOfTwoWhoLookedThroughTheSameEventsAddsThem) {
   const std::uint64_t from = store().deliveries().mark().value().event;
   const std::vector<NewDelivery> all{delivery("m1")};
-  EXPECT_EQ(store().deliveries().add(from, from + 5, all).value(), Wrote::done);
-  EXPECT_EQ(store().deliveries().add(from, from + 5, all).value(), Wrote::lost);
+  EXPECT_EQ(store().deliveries().add(from, from + 5, all, kLongest).value(), Wrote::done);
+  EXPECT_EQ(store().deliveries().add(from, from + 5, all, kLongest).value(), Wrote::lost);
   EXPECT_EQ(store().deliveries().mark().value().event, from + 5);
   EXPECT_EQ(taken(store()), "m1");
   EXPECT_EQ(taken(store()), "");
@@ -72,6 +72,20 @@ TEST_P(StoreDeliveries, ARetryRestsAndAFinishedOneIsGone) {
   ASSERT_TRUE(store().deliveries().finish(one));
   clock_.now_ms += kLease.count();
   EXPECT_EQ(taken(store()), "");
+}
+
+TEST_P(StoreDeliveries, WhatNobodyTookForTooLongMakesRoomForWhatComes) {
+  add(store(), {delivery("m1", "https://named.no.more/"), delivery("m1")});
+  clock_.now_ms += kLongest.count();
+  add(store(), {delivery("m2")});
+  EXPECT_EQ(taken(store()), "m1") << "not yet";
+  clock_.now_ms += 1;
+  add(store(), {delivery("m3")});
+  EXPECT_EQ(taken(store(), "https://named.no.more/"), "");
+  EXPECT_EQ(taken(store()), "m2");
+  EXPECT_EQ(taken(store()), "m3");
+  clock_.now_ms += kLease.count();
+  EXPECT_EQ(taken(store()), "m2") << "and m1 does not come back";
 }
 
 TEST_P(StoreDeliveries, SurviveARestart) {
