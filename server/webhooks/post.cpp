@@ -58,6 +58,7 @@ int post_webhook(const WebhookPost& post) {
   set(CURLOPT_FOLLOWLOCATION, 0L);
   set(CURLOPT_PROXY, "");
   set(CURLOPT_NOSIGNAL, 1L);
+  set(CURLOPT_QUICK_EXIT, 1L);  // a try that is over does not wait for a name server that is silent
   set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(post.connect_timeout.count()));
   set(CURLOPT_TIMEOUT_MS, static_cast<long>(post.timeout.count()));
   set(CURLOPT_OPENSOCKETFUNCTION, open_socket);

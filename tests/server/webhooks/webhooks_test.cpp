@@ -3,7 +3,9 @@
 #include "server/webhooks/webhooks.h"
 
 #include <arpa/inet.h>
+#include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -13,11 +15,23 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
+#include <thread>
 
 #include "server/jobs/sqlite_store.h"
 #include "server/webhooks/post.h"
 #include "server/webhooks/signature.h"
 #include "tests/fixtures/webhook_receiver.h"
+
+/// Before that of the system, for curl too: a name server that does not answer for eight seconds.
+extern "C" int getaddrinfo(const char* name, const char* service, const addrinfo* hints, addrinfo** found) {
+  if (name != nullptr && std::string_view(name) == "silent.test") {
+    std::this_thread::sleep_for(std::chrono::seconds(8));
+    return EAI_AGAIN;
+  }
+  static const auto system = reinterpret_cast<decltype(&::getaddrinfo)>(::dlsym(RTLD_NEXT, "getaddrinfo"));
+  return system(name, service, hints, found);
+}
 
 namespace kiln::testing {
 namespace {
@@ -183,6 +197,14 @@ TEST_F(WebhooksTest, AnAnswerThatTakesTooLongIsNone) {
   const auto begin = Clock::now();
   EXPECT_EQ(post_webhook(post), 0);
   EXPECT_LT(Clock::now() - begin, 5s);
+}
+
+TEST(WebhookPost, DoesNotWaitForANameServerThatIsSilent) {
+  WebhookPost post{"https://silent.test/", {}, "{}"};
+  post.timeout = Millis(300);
+  const auto begin = Clock::now();
+  EXPECT_EQ(post_webhook(post), 0);
+  EXPECT_LT(Clock::now() - begin, 5s) << "it is silent for eight";
 }
 
 TEST_F(WebhooksTest, RedirectsAreNotFollowed) {
