@@ -1,12 +1,16 @@
-// The pieces below the routes: heads, escapes, forms.
+// The pieces below the routes: heads, escapes, forms, the queue of those who wait.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <thread>
 
 #include "core/base/random.h"
 #include "server/http/multipart.h"
 #include "server/http/parse_head.h"
+#include "server/http/work_queue.h"
 
 namespace kiln {
 namespace {
@@ -138,6 +142,70 @@ TEST(Multipart, NeedsABoundary) {
   for (const char* type : {"multipart/form-data", "multipart/form-data; boundary=", "multipart/form-data; boundary=\"",
                            "multipart/form-data; boundary=\"a b\""})
     EXPECT_FALSE(MultipartReader::open(form_head(type), body).has_value()) << type;
+}
+
+HeadJob job_number(int number) {
+  HeadJob job;
+  job.fd = number;
+  return job;
+}
+
+TEST(WorkQueue, WakesWhoFellAsleepLast) {
+  WorkQueue queue(10);
+  std::array<int, 3> taken{};
+  std::vector<std::thread> threads;
+  const auto wait_for_sleepers = [&queue](std::size_t count) {
+    while (queue.sleepers() != count) std::this_thread::yield();
+  };
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    threads.emplace_back([&, i] {
+      while (queue.pop()) ++taken[i];
+    });
+    wait_for_sleepers(i + 1);
+  }
+  for (int i = 0; i < 20; ++i) {
+    HeadJob job = job_number(i);
+    ASSERT_TRUE(queue.push(job));
+    wait_for_sleepers(taken.size());
+  }
+  queue.close();
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(taken, (std::array<int, 3>{0, 0, 20}));
+}
+
+TEST(WorkQueue, GivesEachJobToOneOfMany) {
+  constexpr int kPushers = 4, kEach = 2000;
+  WorkQueue queue(100);
+  std::vector<std::atomic<int>> taken(kPushers * kEach);
+  std::vector<std::thread> takers, pushers;
+  for (int i = 0; i < 8; ++i) {
+    takers.emplace_back([&] {
+      while (auto job = queue.pop()) ++taken[static_cast<std::size_t>(job->fd)];
+    });
+  }
+  for (int pusher = 0; pusher < kPushers; ++pusher) {
+    pushers.emplace_back([&, pusher] {
+      for (int i = 0; i < kEach; ++i) {
+        HeadJob job = job_number(pusher * kEach + i);
+        while (!queue.push(job)) std::this_thread::yield();  // full
+      }
+    });
+  }
+  for (std::thread& thread : pushers) thread.join();
+  queue.close();
+  for (std::thread& thread : takers) thread.join();
+  for (const std::atomic<int>& count : taken) EXPECT_EQ(count, 1);
+  HeadJob late = job_number(0);
+  EXPECT_FALSE(queue.push(late)) << "closed";
+}
+
+TEST(WorkQueue, RefusesWhatItHasNoRoomFor) {
+  WorkQueue queue(2);
+  for (const bool taken : {true, true, false}) {
+    HeadJob job = job_number(1);
+    EXPECT_EQ(queue.push(job), taken);
+  }
+  EXPECT_EQ(queue.size(), 2U);
 }
 
 }  // namespace
