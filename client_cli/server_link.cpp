@@ -44,7 +44,7 @@ Failure failure_of_reply(int status, const std::string& body) {
 HttpReply reply_of(httplib::Response response) {
   const std::string offset = response.get_header_value("Upload-Offset");
   return {response.status, std::move(response.body), response.get_header_value("Location"),
-          std::strtoull(offset.c_str(), nullptr, 10)};
+          std::strtoull(offset.c_str(), nullptr, 10), response.has_header("Upload-Asset")};
 }
 
 httplib::Headers to_headers(const HttpHeaders& headers) { return {headers.begin(), headers.end()}; }

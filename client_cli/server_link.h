@@ -22,6 +22,7 @@ struct HttpReply {
   std::string body;
   std::string location;
   std::uint64_t upload_offset = 0;  // bytes of an unfinished upload that the server has
+  bool upload_stored = false;       // they have become an asset
 };
 
 /// A request body in pieces that stay where they are; the sum of them is sent.

@@ -1,6 +1,7 @@
 #include "server/blobs/partial_upload.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -195,8 +196,30 @@ void PartialUploads::forget(const std::string& id) {
   for (const char* suffix : {kInfo, kDone, kBytes}) blobs_->files().unlink(file(id, suffix));
 }
 
-Result<PartialUpload> PartialUploads::begin(const PartialUpload& wanted) {
+/// Waits for its turn. The file may have been swept away by the time that comes: then there is another one.
+Result<int> PartialUploads::lock_begin() const {
+  FileLayer& files = blobs_->files();
+  const fs::path name = blobs_->folder() / "tmp" / "up.begin";
+  while (true) {
+    const int fd = retry_interrupted([&] { return files.open(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0600); });
+    if (fd < 0) return io_fault(errno, "begin an upload");
+    HeldFile held(files, fd);
+    if (retry_interrupted([&] { return ::flock(fd, LOCK_EX); }) != 0) return io_fault(errno, "begin an upload");
+    if (lock_file(fd, name)) return held.release();
+  }
+}
+
+Result<PartialUpload> PartialUploads::begin(const PartialUpload& wanted, int most) {
   if (auto known = find(wanted.id, wanted.tenant); known || known.error().code != "not_found") return known;
+  if (most <= 0) return make(wanted);
+  KILN_TRY(turn, lock_begin());
+  const HeldFile held(blobs_->files(), turn);
+  if (unfinished(wanted.tenant) < most) return make(wanted);
+  return fault("quota",
+               "there may be " + std::to_string(most) + " unfinished uploads at a time: complete or delete some");
+}
+
+Result<PartialUpload> PartialUploads::make(const PartialUpload& wanted) {
   KILN_TRY(fd, open_locked(wanted.id, O_CREAT));
   HeldFile held(blobs_->files(), fd);
   auto made = find(wanted.id, wanted.tenant);  // by somebody who had the lock before

@@ -3,7 +3,8 @@
 // in the spool. What was acknowledged survives kill -9 and power loss; bytes behind it are forgotten. One writer at a
 // time: the file of bytes is locked while somebody writes it.
 //   tmp/up.<id>  bytes      tmp/up.<id>.info  record      tmp/up.<id>.done  record of one that has become a blob
-// Fault codes: those of blob_store.h.
+//   tmp/up.begin  locked while one begins
+// Fault codes: those of blob_store.h, and quota.
 
 #include <chrono>
 #include <cstdint>
@@ -62,8 +63,9 @@ class PartialUploads {
   /// How long after its last byte, or after it became a blob, an upload is remembered.
   static constexpr std::chrono::seconds kKept{24 * 3600};
 
-  /// Makes the upload, or finds the one that has this id already.
-  Result<PartialUpload> begin(const PartialUpload&);
+  /// Makes the upload, or finds the one that has this id already. "quota" when `most` of its tenant's wait for bytes,
+  /// however many begin at once and in however many programs; 0: any number may.
+  Result<PartialUpload> begin(const PartialUpload&, int most = 0);
   Result<PartialUpload> find(const std::string& id, const std::string& tenant) const;
   /// "offset_mismatch" unless `offset` is what counts so far, "upload_busy" while somebody writes it.
   Result<PieceWriter> append(const PartialUpload&, std::uint64_t offset);
@@ -78,6 +80,8 @@ class PartialUploads {
 
  private:
   friend class PieceWriter;
+  Result<int> lock_begin() const;
+  Result<PartialUpload> make(const PartialUpload&);
   std::filesystem::path file(const std::string& id, const char* suffix) const;
   Result<PartialUpload> read_record(const std::filesystem::path&) const;
   Result<void> write_record(const PartialUpload&);

@@ -31,16 +31,14 @@ class UploadDesk::Piece final : public UploadPiece {
 
 Result<PartialUpload> UploadDesk::begin(PartialUpload wanted) {
   wanted.id = id_of(wanted);
-  if (!uploads_.find(wanted.id, wanted.tenant) && uploads_.unfinished(wanted.tenant) >= kMostUnfinished) {
-    return fault("quota", "there may be " + std::to_string(kMostUnfinished) +
-                              " unfinished uploads at a time: complete or delete some");
-  }
-  return uploads_.begin(wanted);
+  return uploads_.begin(wanted, kMostUnfinished);
 }
 
 Result<PartialUpload> UploadDesk::find(const std::string& id, const std::string& tenant) {
   KILN_TRY(upload, uploads_.find(id, tenant));
-  return complete(std::move(upload));
+  auto completed = complete(upload);
+  if (!completed && completed.error().code == "upload_busy") return upload;  // somebody is completing it
+  return completed;
 }
 
 Result<std::unique_ptr<UploadPiece>> UploadDesk::append(const PartialUpload& wanted, std::uint64_t offset) {

@@ -30,7 +30,7 @@ class UploadDesk {
   /// same upload, so that a client that forgot its address goes on by asking again. "quota" when the tenant has
   /// kMostUnfinished already.
   Result<PartialUpload> begin(PartialUpload wanted);
-  /// Completes what a crash left nearly complete.
+  /// Completes what a crash left nearly complete. While somebody else completes it, all bytes are there, not `done`.
   Result<PartialUpload> find(const std::string& id, const std::string& tenant);
   Result<std::unique_ptr<UploadPiece>> append(const PartialUpload& id_and_tenant, std::uint64_t offset);
   Result<void> remove(const std::string& id, const std::string& tenant);

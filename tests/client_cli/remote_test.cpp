@@ -67,8 +67,11 @@ class Remote : public ::testing::Test {
   bool known = false;       // HEAD of an asset finds it
   std::size_t already = 0;  // bytes of the scene that an earlier upload left
   bool speaks_tus = true;   // begins uploads in pieces, and has forgotten them by the next request
+  int seals_after = -1;     // or keeps them, and makes an asset of one when it was asked so often
   std::string sent_file = "plane.gltf";
 
+  std::atomic<std::size_t> whole{0};  // bytes of an upload in pieces
+  std::atomic<int> asked{0};          // how it stands
   std::atomic<int> uploads{0}, begun{0}, streams{0}, downloads{0}, cancels{0};
   std::mutex mutex;
   std::string submitted, last_event_id, token, key;
@@ -95,6 +98,15 @@ class Remote : public ::testing::Test {
       reply.status = speaks_tus ? 201 : 404;
       reply.set_header("Location", "/v1/uploads/0123");
       reply.set_header("Upload-Offset", "0");
+    });
+    server.Patch("/v1/uploads/0123", [this](const httplib::Request& request, auto& reply) {
+      reply.status = seals_after < 0 ? 404 : 204;
+      whole += request.body.size();
+      reply.set_header("Upload-Offset", std::to_string(whole));
+    });
+    server.Get("/v1/uploads/0123", [this](const auto&, auto& reply) {
+      reply.set_header("Upload-Offset", std::to_string(whole));
+      if (++asked >= seals_after) reply.set_header("Upload-Asset", "its hash");
     });
     server.Post("/v1/jobs", [this](const httplib::Request& request, auto& reply) { submit(request, reply); });
     server.Get("/v1/jobs", [this](const auto&, auto& reply) {
@@ -213,6 +225,18 @@ TEST_F(Remote, WhereUploadsInPiecesAreNotKeptALargeFileIsSentWhole) {
   const Ran old = run_kiln({"submit", scene, "--preset", "prt", "--server", url});
   EXPECT_EQ(old.exit, 0) << old.err;
   EXPECT_EQ(uploads, 2);
+}
+
+TEST_F(Remote, AnUploadInPiecesIsOverWhenItIsAnAsset) {
+  sent_file = "large.ply";
+  scene = folder.write(sent_file, "ply\n" + std::string(17 << 20, 'x'));
+  seals_after = 2;
+  const Ran ran = run_kiln({"submit", scene, "--preset", "prt", "--server", url});
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(whole, (17U << 20) + 4) << "nothing twice";
+  EXPECT_EQ(asked, 2) << "until it is one";
+  EXPECT_EQ(begun, 1);
+  EXPECT_EQ(ran.err.find("broke"), std::string::npos) << ran.err;
 }
 
 TEST_F(Remote, AnEnvironmentFileTravelsWithItsName) {

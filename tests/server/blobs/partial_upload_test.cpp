@@ -2,9 +2,12 @@
 
 #include "server/blobs/partial_upload.h"
 
+#include <atomic>
 #include <fstream>
 #include <functional>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "tests/server/blobs/blob_conformance.h"
 #include "tests/server/blobs/faulty_files.h"
@@ -68,6 +71,30 @@ TEST_P(BlobConformance, AnUploadInPiecesHasOneWriterAndOneOffset) {
   EXPECT_EQ(uploads.begin(wanted())->offset, 5U) << "asked for again";
   auto writer = uploads.append(upload, 5).value();
   EXPECT_EQ(writer.write(bytes_of(kText)).error().code, "too_large");
+}
+
+TEST_P(BlobConformance, ATenantBeginsSoManyUploadsHoweverManyAskAtOnce) {
+  constexpr int kMost = 7, kEach = 5;
+  const auto other_store = open();  // another program with the same spool
+  PartialUploads uploads(store()), others(*other_store);
+  std::atomic<int> begun{0}, refused{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 6; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < kEach; ++i) {
+        PartialUpload mine = wanted();
+        mine.id = std::string(30, 'b') + std::to_string(t) + std::to_string(i);
+        const auto made = (t % 2 == 0 ? uploads : others).begin(mine, kMost);
+        EXPECT_EQ(made ? "" : made.error().code, made ? "" : "quota");
+        ++(made ? begun : refused);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(begun, kMost);
+  EXPECT_EQ(refused, 6 * kEach - kMost);
+  EXPECT_EQ(uploads.unfinished("studio"), kMost);
+  EXPECT_TRUE(uploads.begin(wanted("another"), kMost)) << "of each tenant";
 }
 
 TEST_P(BlobConformance, AnUploadInPiecesGoesOnThroughAnotherProgramWithTheSameSpool) {

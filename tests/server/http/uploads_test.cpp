@@ -7,6 +7,8 @@
 #include "core/base/base64.h"
 #include "core/base/sha256.h"
 #include "server/api/upload_fields.h"
+#include "server/blobs/file_blobs.h"
+#include "server/blobs/partial_upload.h"
 #include "tests/server/http/raw_client.h"
 
 namespace kiln {
@@ -200,6 +202,27 @@ TEST_F(Uploads, S4AHundredUnfinishedOnesAreEnough) {
   RawReply refused = begin({"Upload-Length: 28"});
   EXPECT_EQ(refused.status, 429);
   EXPECT_EQ(refused.fields.count("retry-after"), 1U);
+}
+
+TEST_F(Uploads, WhileSomebodyMakesAnAssetOfItAnUploadIsWholeAndNotBusy) {
+  const std::string upload = begin(), id = upload.substr(upload.rfind('/') + 1);
+  const auto blobs = open_file_blobs(server_.service().folder()).value();
+  PartialUploads uploads(*blobs);  // another server with the same spool, which dies before it makes the asset
+  {
+    auto writer = uploads.append(uploads.find(id, "").value(), 0).value();
+    ASSERT_TRUE(writer.write(bytes_of(kText)));
+    ASSERT_TRUE(writer.keep());
+  }
+  {
+    const auto holder = uploads.append(uploads.find(id, "").value(), kText.size());
+    ASSERT_TRUE(holder);
+    RawReply whole = head(upload);
+    EXPECT_EQ(whole.status, 200);
+    EXPECT_EQ(whole.fields["upload-offset"], std::to_string(kText.size()));
+    EXPECT_FALSE(whole.fields.contains("upload-asset"));
+    EXPECT_EQ(patch(upload, kText.size(), "", {"Content-Length: 0"}).status, 409) << "one writer at a time";
+  }
+  EXPECT_EQ(head(upload).fields["upload-asset"], sha_of(kText));
 }
 
 TEST(UploadFields, ADateIsTheOneOfHttp) {
