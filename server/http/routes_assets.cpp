@@ -89,7 +89,7 @@ Reply put_asset(RouteContext&, Request& request) {
   if (!is_sha256(sha256)) return problem_reply(bad_name(sha256));
   auto piece = asked_piece(request);
   if (!piece) return problem_reply(piece.error());
-  if (request.service->has_asset(sha256, std::nullopt)) return known_asset(*request.service, request, sha256);
+  if (request.service->has_asset(sha256, "")) return known_asset(*request.service, request, sha256);
   return store_piece(*request.service, request, sha256, *piece);
 }
 

@@ -86,6 +86,7 @@ struct StoreCounts {
   std::uint64_t queued = 0, running = 0, succeeded = 0, failed = 0, canceled = 0;
   std::uint64_t pinned = 0;
   std::int64_t oldest_queued_ms = 0;  // creation time; 0 when nothing waits
+  std::uint64_t deliveries = 0;       // messages that still have to reach somebody (delivery.h)
 };
 
 /// Held from making a blob until a row refers to it, or alone while the bytes of forgotten blobs are removed: so that
@@ -148,7 +149,9 @@ class JobStore {
   virtual Result<void> log(const std::string& job_id, const std::string& line) = 0;
 
   /// Notes that a blob exists, that the tenant has it, and that it was just referred to. Call after it is durable.
-  virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant = {}) = 0;
+  /// Without a tenant nobody has it who had it not before.
+  virtual Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes,
+                                  const std::optional<std::string>& tenant = "") = 0;
   /// Whether the tenant has the blob; without one: whether anybody has.
   virtual Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant = {}) = 0;
   /// A blob that a tenant pinned is kept whether a job needs it or not. "not_found" when the tenant has none.

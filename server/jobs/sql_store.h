@@ -43,7 +43,8 @@ class SqlStore final : public JobStore {
   Result<std::uint64_t> last_event_id() override;
 
   Result<void> log(const std::string& job_id, const std::string& line) override;
-  Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) override;
+  Result<void> touch_blob(const std::string& sha256, std::uint64_t bytes,
+                          const std::optional<std::string>& tenant) override;
   Result<bool> knows_blob(const std::string& sha256, const std::optional<std::string>& tenant) override;
   Result<void> pin_blob(const std::string& sha256, const std::string& tenant, bool pinned) override;
   Result<std::vector<std::string>> forget_unused_blobs(Millis grace, bool only_count) override;
@@ -94,11 +95,11 @@ class SqlStore final : public JobStore {
 Result<std::vector<Artifact>> find_result_in(Connection&, const std::string& content_key);
 /// The events that tell of a success.
 Result<void> append_success(Connection&, const std::string& job_id, std::span<const Artifact>, std::int64_t now_ms);
-/// The blob exists, the tenant has it, and it was referred to now.
+/// The blob exists, the tenant has it (if there is one), and it was referred to now.
 struct BlobNote {
   std::string sha256;
   std::uint64_t bytes = 0;
-  std::string tenant;
+  std::optional<std::string> tenant;
 };
 Result<void> note_blob(Connection&, const BlobNote&, std::int64_t now_ms);
 

@@ -63,12 +63,14 @@ Result<int> SqlStore::forget_old_jobs(const Retention& retention, bool only_coun
 Result<void> note_blob(Connection& db, const BlobNote& blob, std::int64_t now) {
   KILN_DO(db.run("INSERT INTO blob VALUES(?,?,?) ON CONFLICT(sha256) DO UPDATE SET last_ref_at=excluded.last_ref_at",
                  blob.sha256, blob.bytes, now));
+  if (!blob.tenant) return {};
   KILN_DO(
-      db.run("INSERT INTO blob_tenant(sha256, tenant) VALUES(?,?) ON CONFLICT DO NOTHING", blob.sha256, blob.tenant));
+      db.run("INSERT INTO blob_tenant(sha256, tenant) VALUES(?,?) ON CONFLICT DO NOTHING", blob.sha256, *blob.tenant));
   return {};
 }
 
-Result<void> SqlStore::touch_blob(const std::string& sha256, std::uint64_t bytes, const std::string& tenant) {
+Result<void> SqlStore::touch_blob(const std::string& sha256, std::uint64_t bytes,
+                                  const std::optional<std::string>& tenant) {
   return write([&](Connection& db, std::int64_t now) { return note_blob(db, {sha256, bytes, tenant}, now); });
 }
 

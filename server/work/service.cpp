@@ -140,6 +140,7 @@ class LocalService final : public Service {
   Result<Job> wait_until(const std::string& id, Millis timeout, Condition&& reached);
   void overlay_progress(Job&) const;
   Result<void> check_room(std::uint64_t bytes) const;
+  void share_with_nobody(const JobInputs&);
   Result<StoredBlob> register_blob(const std::string& tenant, const std::function<Result<StoredBlob>()>& store);
   bool may_claim() const { return disk().free_fraction >= options_.hard_free_fraction; }
   DiskSpace disk() const;
@@ -201,20 +202,30 @@ Result<Created> LocalService::submit(const Submission& submission) {
   if (bus_.closed()) return draining();
   KILN_TRY(inputs, inputs_of(submission));
   NewJob job;
-  job.tenant = submission.tenant;
+  job.tenant = submission.tenant.value_or("");
   job.max_open = submission.max_open;
   job.label = submission.recipe.label;
   job.recipe = recipe_json(submission.recipe);
-  job.content_key = content_key(submission.tenant, inputs, submission.recipe);
+  job.content_key = content_key(job.tenant, inputs, submission.recipe);
   job.inputs = std::move(inputs);
   job.force = submission.force;
   job.idempotency_key = submission.idempotency_key;
   job.max_queued = options_.max_queued;
   job.request_hash = request_hash(job);
+  if (!submission.tenant) share_with_nobody(job.inputs);
   KILN_TRY(created, store_->create(job));
   supervisor_.wake();
   bus_.announce();
   return created;
+}
+
+/// Who sees everything bakes the files of any tenant: from then on those without a tenant have them, too.
+void LocalService::share_with_nobody(const JobInputs& inputs) {
+  for (const NamedBlob& file : all_files(inputs)) {
+    if (store_->knows_blob(file.sha256, "").value_or(true) || !has_asset(file.sha256, std::nullopt)) continue;
+    const auto reader = blobs_->open_blob(file.sha256);
+    if (reader) static_cast<void>(store_->touch_blob(file.sha256, reader->size(), ""));  // else asset_not_found follows
+  }
 }
 
 Result<std::string> LocalService::plan(const Submission& submission) {
@@ -350,7 +361,7 @@ bool LocalService::has_asset(const std::string& sha256, const std::optional<std:
   if (!gate) return false;
   if (!store_->knows_blob(sha256, tenant).value_or(false)) return false;
   const auto reader = blobs_->open_blob(sha256);
-  return reader && store_->touch_blob(sha256, reader->size(), tenant.value_or("")).has_value();
+  return reader && store_->touch_blob(sha256, reader->size(), tenant).has_value();
 }
 
 ServiceStats LocalService::stats() {

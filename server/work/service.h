@@ -47,7 +47,7 @@ struct ServiceOptions {
 
 /// A job or plan to be. All files are blobs already (put_asset).
 struct Submission {
-  std::string tenant;                    // whose the job is to be
+  std::optional<std::string> tenant;     // whose the job is to be; none: nobody's, and any tenant's files serve
   int max_open = 0;                      // unfinished jobs that the tenant may have; 0: no limit
   std::string scene_name = "scene.glb";  // for error places
   std::string scene_sha256;              // empty: recipe.scene_asset
@@ -150,7 +150,7 @@ class Service {
 
   virtual Result<OpenArtifact> open_artifact(const std::string& id, const std::string& name) = 0;
   virtual Result<std::unique_ptr<AssetUpload>> put_asset(const AssetRequest&) = 0;
-  /// Whether the tenant has it; without one: whether anybody has.
+  /// Whether the tenant has it; without one: whether anybody has. Asking keeps it for a while.
   virtual bool has_asset(const std::string& sha256, const std::optional<std::string>& tenant) = 0;
   /// Where an interrupted upload of `sha256` goes on.
   virtual std::uint64_t asset_offset(const std::string& sha256, const std::string& tenant) = 0;

@@ -94,7 +94,8 @@ class BrokenStore final : public JobStore {
   }
   Result<std::uint64_t> last_event_id() override { return store_->last_event_id(); }
   Result<void> log(const std::string& id, const std::string& line) override { return store_->log(id, line); }
-  Result<void> touch_blob(const std::string& sha, std::uint64_t bytes, const std::string& tenant) override {
+  Result<void> touch_blob(const std::string& sha, std::uint64_t bytes,
+                          const std::optional<std::string>& tenant) override {
     return store_->touch_blob(sha, bytes, tenant);
   }
   Result<bool> knows_blob(const std::string& sha, const std::optional<std::string>& tenant) override {

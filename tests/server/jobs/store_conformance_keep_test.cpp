@@ -81,6 +81,15 @@ TEST_P(StoreConformance, APinnedBlobIsKeptWithoutAJobAndEachTenantHasItsOwnPin) 
   EXPECT_TRUE(forgotten());
 }
 
+TEST_P(StoreConformance, ABlobThatIsTouchedForNobodyIsKeptAndNobodyHasIt) {
+  EXPECT_TRUE(store().touch_blob(sha('d'), 7, "ours"));
+  clock_.now_ms += kDay.count() + 1;
+  EXPECT_TRUE(store().touch_blob(sha('d'), 7, std::nullopt));
+  EXPECT_EQ(std::ranges::count(store().forget_unused_blobs(kDay).value(), sha('d')), 0);
+  EXPECT_FALSE(store().knows_blob(sha('d'), "").value());
+  EXPECT_TRUE(store().knows_blob(sha('d'), "ours").value());
+}
+
 TEST_P(StoreConformance, ATenantUploadsSoMuchADayAndAnotherIsNotHeldUp) {
   clock_.now_ms = 20'000 * kDay.count() + 1000;
   const std::int64_t day = store().charge_upload("busy", 60, 100).value();

@@ -56,6 +56,23 @@ TEST_F(TenantTest, AnothersAssetCannotBeReadUsedOrSeenToBeThere) {
   EXPECT_EQ(b_.plan(stolen).error().code, "asset_not_found");
 }
 
+TEST_F(TenantTest, WhoSeesAllFindsAnAssetAndBakesItWithoutHandingItOutByLooking) {
+  const std::string sha256 = put_for(a_, "a secret scene");
+  TenantService nobody(*service_, "", 0);
+  EXPECT_TRUE(service_->has_asset(sha256, std::nullopt));
+  EXPECT_FALSE(nobody.has_asset(sha256, std::nullopt)) << "looking gives it to nobody";
+  EXPECT_FALSE(nobody.open_asset(sha256));
+  Submission job = scene_of(a_, "ok");
+  job.scene_sha256 = sha256;
+  EXPECT_EQ(nobody.submit(job).error().code, "asset_not_found");
+  job.tenant.reset();
+  EXPECT_TRUE(service_->plan(job));
+  const auto baked = service_->submit(job);
+  ASSERT_TRUE(baked) << baked.error().code;
+  EXPECT_EQ(service_->wait_done(baked->job.id, 20s)->state, JobState::succeeded);
+  EXPECT_TRUE(nobody.has_asset(sha256, std::nullopt)) << "a bake does";
+}
+
 TEST_F(TenantTest, AnothersHalfOfANamedUploadIsNeitherSeenNorGoneOnWithNorInTheWay) {
   const std::string text = "a secret scene that ends in zeros 0000";
   const auto bytes = [&](std::size_t from, std::size_t count) {
