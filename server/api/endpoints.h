@@ -27,6 +27,9 @@ const std::vector<Endpoint>& endpoints();
 /// Takes a request body.
 bool takes_body(const Endpoint&);
 
+/// The parameters of its query.
+std::vector<std::string> query_names(const Endpoint&);
+
 /// The OpenAPI 3.1 document of endpoints().
 std::string openapi_json();
 

@@ -36,6 +36,20 @@ Json operation(const Endpoint& endpoint) {
   return object;
 }
 
+/// What receivers are sent (server/webhooks): Standard Webhooks.
+Json webhook(std::string_view status) {
+  Json post = {{"operationId", "job." + std::string(status)},
+               {"summary", "A job ended: " + std::string(status) + ". Signed, and sent until it is answered"},
+               {"tags", {"webhooks"}}};
+  for (const char* name : {"webhookId", "webhookTimestamp", "webhookSignature"})
+    post["parameters"].push_back(reference("parameters", name));
+  post["requestBody"] = {{"required", true}, {"content", content({{"application/json", "WebhookMessage"}})}};
+  post["responses"] = {{"2XX", {{"description", "Taken; it does not come again"}}},
+                       {"410", {{"description", "Not wanted; it does not come again"}}},
+                       {"default", {{"description", "It comes again, with the same id, for a day"}}}};
+  return {{"post", std::move(post)}};
+}
+
 std::string lower(std::string_view method) {
   std::string text(method);
   for (char& c : text) c = static_cast<char>(c - 'A' + 'a');
@@ -43,6 +57,16 @@ std::string lower(std::string_view method) {
 }
 
 }  // namespace
+
+std::vector<std::string> query_names(const Endpoint& endpoint) {
+  static const Json all = Json::parse(openapi_components())["parameters"];
+  std::vector<std::string> names;
+  for (const std::string_view parameter : endpoint.parameters) {
+    const Json& known = all.at(std::string(parameter));
+    if (known.at("in") == "query") names.push_back(known.at("name"));
+  }
+  return names;
+}
 
 std::string openapi_json() {
   Json document = {
@@ -55,6 +79,8 @@ std::string openapi_json() {
       {"servers", {{{"url", "/"}}}}};
   for (const Endpoint& endpoint : endpoints())
     document["paths"][std::string(endpoint.path)][lower(endpoint.method)] = operation(endpoint);
+  for (const char* status : {"succeeded", "failed", "canceled"})
+    document["webhooks"]["job." + std::string(status)] = webhook(status);
   document["components"] = Json::parse(openapi_components());
   document["components"]["securitySchemes"] = {{"bearer", {{"type", "http"}, {"scheme", "bearer"}}},
                                                {"basic", {{"type", "http"}, {"scheme", "basic"}}}};

@@ -43,7 +43,13 @@ constexpr const char* kParameters = R"json({
   "pieceOffset": {"name": "Upload-Offset", "in": "header", "required": true, "schema": {"type": "integer", "minimum": 0},
     "description": "Where the piece begins: what HEAD tells"},
   "uploadChecksum": {"name": "Upload-Checksum", "in": "header", "schema": {"type": "string"},
-    "description": "sha256 or sha1 and base64 of the piece, which then counts whole or not at all"}
+    "description": "sha256 or sha1 and base64 of the piece, which then counts whole or not at all"},
+  "webhookId": {"name": "webhook-id", "in": "header", "required": true, "schema": {"type": "string"},
+    "description": "The same in every try: drop what you have seen"},
+  "webhookTimestamp": {"name": "webhook-timestamp", "in": "header", "required": true, "schema": {"type": "integer"},
+    "description": "Seconds since 1970, of this try: refuse what is minutes away"},
+  "webhookSignature": {"name": "webhook-signature", "in": "header", "required": true, "schema": {"type": "string"},
+    "description": "v1, and the base64 of HMAC-SHA256 over id.timestamp.body; the key is that of the receiver's secret"}
 })json";
 
 constexpr const char* kJobSchemas = R"json(
@@ -91,6 +97,16 @@ constexpr const char* kJobSchemas = R"json(
         "properties": {"id": {"type": "integer"}, "at": {"type": "string", "format": "date-time"},
           "kind": {"enum": ["state", "log", "artifact", "done"]}, "status": {"$ref": "#/components/schemas/Status"},
           "message": {"type": "string"}}}}}},
+  "WebhookMessage": {"type": "object", "required": ["type", "timestamp", "data"], "properties": {
+      "type": {"enum": ["job.succeeded", "job.failed", "job.canceled"]},
+      "timestamp": {"type": "string", "format": "date-time"},
+      "data": {"type": "object", "description": "Of a job that was removed meanwhile: id and status alone",
+        "required": ["id", "status"], "properties": {
+          "id": {"type": "string"}, "status": {"enum": ["succeeded", "failed", "canceled"]}, "label": {"type": "string"},
+          "cached": {"type": "boolean"}, "attempt": {"type": "integer"}, "tenant": {"type": "string"},
+          "created_at": {"type": "string", "format": "date-time"}, "finished_at": {"type": "string", "format": "date-time"},
+          "error": {"type": "object", "required": ["code", "detail", "where"], "properties": {
+            "code": {"type": "string"}, "detail": {"type": "string"}, "where": {"type": "string"}}}}}}},
   "JobList": {"type": "object", "required": ["jobs", "next_cursor"], "properties": {
       "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}}, "next_cursor": {"type": ["string", "null"]}}},
 )json";

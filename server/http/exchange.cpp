@@ -7,6 +7,7 @@
 #include <cctype>
 #include <chrono>
 
+#include "server/api/job_request.h"
 #include "server/api/upload_fields.h"
 #include "server/http/parse_head.h"
 
@@ -142,6 +143,14 @@ Answer<void> Exchange::check_body(const Head& head, const Endpoint& endpoint) co
   return {};
 }
 
+/// Pages have parameters of their own (web_viewer), which only they read.
+Answer<void> Exchange::check_query(const Head& head, const Endpoint& endpoint) const {
+  if (head.params.empty() || endpoint.tag == "viewer") return {};
+  const auto values = take_params(head.params, query_names(endpoint));
+  if (!values) return tl::make_unexpected(values.error());
+  return {};
+}
+
 Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Request& request) {
   if (auto origin = check_origin(request.head); !origin) return problem_reply(origin.error());
   if (cors_.is_preflight(request.head)) return Cors::preflight(handler(request));  // it carries no token
@@ -149,6 +158,7 @@ Reply Exchange::dispatch(const Endpoint* endpoint, const Handler& handler, Reque
   if (!visitor) return problem_reply(visitor.error());
   request.service = *visitor == nullptr ? &service_ : &(*visitor)->service;
   if (endpoint == nullptr) return handler(request);
+  if (auto query = check_query(request.head, *endpoint); !query) return problem_reply(query.error());
   if (auto body = check_body(request.head, *endpoint); !body) return problem_reply(body.error());
   if (!takes_body(*endpoint)) return handler(request);
   const Pass own = *visitor == nullptr ? Pass() : (*visitor)->uploads.enter();

@@ -37,6 +37,7 @@ class Exchange {
 
  private:
   Reply dispatch(const Endpoint*, const Handler&, Request&);
+  Answer<void> check_query(const Head&, const Endpoint&) const;
   Answer<void> check_body(const Head&, const Endpoint&) const;
   Answer<Visitor*> check_token(const Head&, const Endpoint*) const;
   Answer<void> check_origin(const Head&) const;

@@ -93,6 +93,14 @@ void add_jobs(Families& to, const MetricsInput& in) {
   to.counter("stale_commits_total", "Results refused because their claim was lost.", s.stale_commits);
 }
 
+void add_webhooks(Families& to, const ServiceStats& s) {
+  to.gauge("webhook_pending", "Messages that wait for their receivers, of the whole store.", real(s.jobs.deliveries));
+  to.add("webhook_messages_total", "Messages that this server has done with since start, by outcome.",
+         MetricType::Counter, "outcome",
+         {{"delivered", real(s.webhooks.delivered)}, {"failed", real(s.webhooks.failed)}});
+  to.counter("webhook_retries_total", "Tries to deliver that failed and come again.", s.webhooks.retried);
+}
+
 void add_machine(Families& to, const ServiceStats& s) {
   to.add("worker_deaths_total", "Workers that did not end by themselves, by cause.", MetricType::Counter, "cause",
          {{"signal", real(s.deaths_signal)}, {"memory", real(s.deaths_memory)}, {"timeout", real(s.deaths_timeout)}});
@@ -163,6 +171,7 @@ void HttpMetrics::request(const std::string& operation, int status, double secon
 std::string HttpMetrics::text(const MetricsInput& in) const {
   Families families;
   add_jobs(families, in);
+  add_webhooks(families, in.service);
   add_machine(families, in.service);
   add_front(families, in);
   for (MetricFamily& family : state_->registry.Collect()) families.all.push_back(std::move(family));

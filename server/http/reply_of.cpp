@@ -10,7 +10,7 @@ ArtifactReply artifact_reply(const Artifact& artifact) {
   return {artifact.name, artifact.bytes, artifact.sha256, artifact.media_type, {}};
 }
 
-JobReply job_reply(const Job& job) {
+JobReply job_reply(const Job& job, const std::string& request_id) {
   JobReply reply;
   reply.id = job.id;
   reply.label = job.label;
@@ -26,6 +26,7 @@ JobReply job_reply(const Job& job) {
   if (job.error) {
     reply.error = problem_of(job.error->fault);
     reply.error->status = job.error->status;
+    reply.error->request_id = request_id;
   }
   for (const Artifact& artifact : job.artifacts) reply.artifacts.push_back(artifact_reply(artifact));
   return reply;

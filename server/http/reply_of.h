@@ -7,7 +7,8 @@
 
 namespace kiln {
 
-JobReply job_reply(const Job&);
+/// The error of a failed job carries the id of the request that it answers, as every problem does.
+JobReply job_reply(const Job&, const std::string& request_id = {});
 ProgressReply progress_reply(const JobProgress&);
 ArtifactReply artifact_reply(const Artifact&);
 EventReply event_reply(const JobEvent&);

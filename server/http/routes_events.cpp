@@ -13,10 +13,10 @@ using Clock = std::chrono::steady_clock;
 constexpr Millis kSlice{250};  // how late a stream notices that its client is gone
 
 /// The job as it was right after the event: its state is the event's, and results appear with the end only.
-std::string job_at_event(Service& service, const JobEvent& event) {
+std::string job_at_event(Service& service, const JobEvent& event, const std::string& request_id) {
   auto job = service.get(event.job_id);
   JobReply reply;
-  if (job) reply = job_reply(*job);
+  if (job) reply = job_reply(*job, request_id);
   reply.id = event.job_id;
   reply.status = to_string(event.state);
   if (!is_terminal(event.state)) {
@@ -27,7 +27,7 @@ std::string job_at_event(Service& service, const JobEvent& event) {
   return job_json(reply);
 }
 
-std::string event_data(Service& service, const JobEvent& event) {
+std::string event_data(Service& service, const JobEvent& event, const std::string& request_id) {
   switch (event.kind) {
     case EventKind::progress:
       return progress_event_json(event.job_id, progress_reply(event.progress.value_or(JobProgress{})));
@@ -39,19 +39,25 @@ std::string event_data(Service& service, const JobEvent& event) {
     case EventKind::done:
       break;
   }
-  return job_at_event(service, event);
+  return job_at_event(service, event, request_id);
 }
 
+struct Watcher {
+  std::string request_id;
+  bool one_job = false;
+};
+
 /// Sends events until the client, the server or the job is done.
-void send_events(RouteContext& context, EventStream& events, bool one_job, Sink& sink) {
+void send_events(RouteContext& context, EventStream& events, const Watcher& watcher, Sink& sink) {
   if (!sink.write("retry: 2000\n\n")) return;
   Clock::time_point last = Clock::now();
   while (!sink.client_gone() && !context.draining) {
     const auto event = events.next(kSlice);
     if (event) {
-      const SseEvent message{event->id, std::string(to_string(event->kind)), event_data(context.service, *event)};
+      const SseEvent message{event->id, std::string(to_string(event->kind)),
+                             event_data(context.service, *event, watcher.request_id)};
       if (!sink.write(sse_text(message))) return;
-      if (one_job && event->kind == EventKind::done) return;
+      if (watcher.one_job && event->kind == EventKind::done) return;
       last = Clock::now();
     } else if (events.closed()) {
       return;
@@ -71,12 +77,11 @@ Answer<std::optional<std::uint64_t>> last_seen(const Request& request) {
   return id;
 }
 
-Reply stream_reply(RouteContext& context, Pass pass, std::shared_ptr<EventStream> events, bool one_job) {
+Reply stream_reply(RouteContext& context, Pass pass, std::shared_ptr<EventStream> events, Watcher watcher) {
   Reply reply;
   reply.fields = {{"content-type", "text/event-stream"}, {"cache-control", "no-store"}, {"x-accel-buffering", "no"}};
-  reply.stream = [&context, pass = std::move(pass), events = std::move(events), one_job](Sink& sink) {
-    send_events(context, *events, one_job, sink);
-  };
+  reply.stream = [&context, pass = std::move(pass), events = std::move(events),
+                  watcher = std::move(watcher)](Sink& sink) { send_events(context, *events, watcher, sink); };
   return reply;
 }
 
@@ -86,7 +91,7 @@ Reply open_stream(RouteContext& context, Request& request, const std::string& id
   if (!pass) return problem_reply(make_problem("overloaded", "too many event streams are open; try again in a moment"));
   auto events = request.service->subscribe(id, after);
   if (!events) return fault_reply(events.error());
-  return stream_reply(context, std::move(pass), std::move(*events), !id.empty());
+  return stream_reply(context, std::move(pass), std::move(*events), {request.id, !id.empty()});
 }
 
 Reply job_events(RouteContext& context, Request& request) {

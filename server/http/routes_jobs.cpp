@@ -11,7 +11,9 @@ namespace {
 
 constexpr Millis kWaitSlice{250};  // how late a wait notices that its client is gone or the server drains
 
-Reply job_document(int status, const Job& job) { return json_reply(status, job_json(job_reply(job))); }
+Reply job_document(int status, const Job& job, const Request& request) {
+  return json_reply(status, job_json(job_reply(job, request.id)));
+}
 
 Reply overloaded() {
   return problem_reply(make_problem("overloaded", "too many requests wait for jobs; try again in a moment"));
@@ -36,7 +38,7 @@ Reply created_reply(RouteContext& context, Request& request, const Created& crea
     if (pass)
       if (auto later = wait_for(context, request, job.id, wait)) job = std::move(*later);
   }
-  Reply reply = job_document(created.existed ? 200 : 202, job);
+  Reply reply = job_document(created.existed ? 200 : 202, job, request);
   reply.fields.push_back({"location", "/v1/jobs/" + job.id});
   if (wait > 0) reply.fields.push_back({"preference-applied", "wait=" + std::to_string(wait)});
   return reply;
@@ -66,7 +68,7 @@ Reply list_jobs(RouteContext&, Request& request) {
   auto page = request.service->list(query);
   if (!page) return fault_reply(page.error());
   JobListReply reply;
-  for (const Job& job : page->jobs) reply.jobs.push_back(job_reply(job));
+  for (const Job& job : page->jobs) reply.jobs.push_back(job_reply(job, request.id));
   reply.next_cursor = page->next_cursor;
   return json_reply(200, job_list_json(reply));
 }
@@ -80,12 +82,12 @@ Reply get_job(RouteContext& context, Request& request) {
   const Pass pass = *wait > 0 ? context.streams.enter() : nullptr;
   if (*wait > 0 && !pass) return overloaded();
   auto job = *wait > 0 ? wait_for(context, request, id, *wait) : request.service->get(id);
-  return job ? job_document(200, *job) : fault_reply(job.error());
+  return job ? job_document(200, *job, request) : fault_reply(job.error());
 }
 
 Reply cancel_job(RouteContext&, Request& request) {
   auto job = request.service->cancel(path_param(request, "id"));
-  return job ? job_document(200, *job) : fault_reply(job.error());
+  return job ? job_document(200, *job, request) : fault_reply(job.error());
 }
 
 Reply delete_job(RouteContext&, Request& request) {
@@ -98,7 +100,7 @@ Reply delete_job(RouteContext&, Request& request) {
 
 Reply pin_job(Request& request) {
   const auto job = request.service->pin(path_param(request, "id"), request.head.method == "PUT");
-  return job ? job_document(200, *job) : fault_reply(job.error());
+  return job ? job_document(200, *job, request) : fault_reply(job.error());
 }
 
 Reply job_history(Request& request) {

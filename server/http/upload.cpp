@@ -84,11 +84,23 @@ Answer<Form> read_form(Request& request, Service& service) {
   }
 }
 
+/// A job document says everything itself: what the query says beside it would have no effect.
+Answer<void> refuse_query(const QueryParams& params) {
+  std::vector<FieldError> errors;
+  for (const auto& [name, value] : params)
+    errors.push_back({"?" + name, "is for a bare scene: say it in the job", "", ""});
+  if (errors.empty()) return {};
+  return refuse("bad_query", "the query has mistakes; each is listed in errors", std::move(errors));
+}
+
 Answer<Submission> submission_of_form(Request& request, Service& service) {
   auto form = read_form(request, service);
   if (!form) return tl::make_unexpected(form.error());
   const JobFiles files{form->scene ? form->scene->sha256 : "", form->environment ? form->environment->sha256 : ""};
   if (!form->job && request.head.params.empty()) return bad_part("job", "is missing");
+  if (form->job) {
+    if (auto query = refuse_query(request.head.params); !query) return tl::make_unexpected(query.error());
+  }
   auto job = form->job ? parse_job_request(*form->job, files) : parse_raw_request(request.head.params, files);
   if (!job) return tl::make_unexpected(job.error());
   Submission submission = submission_of(std::move(*job));
@@ -99,6 +111,7 @@ Answer<Submission> submission_of_form(Request& request, Service& service) {
 }
 
 Answer<Submission> submission_of_document(Request& request) {
+  if (auto query = refuse_query(request.head.params); !query) return tl::make_unexpected(query.error());
   auto text = read_all(*request.body, kMaxJobDocument);
   if (!text) return tl::make_unexpected(text.error());
   auto job = parse_job_request(*text);

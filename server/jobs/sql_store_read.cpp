@@ -124,6 +124,8 @@ Result<StoreCounts> SqlStore::counts() {
     }
     KILN_TRY(pinned, db.query("SELECT count(*) FROM job WHERE pinned=1"));
     counts.pinned = static_cast<std::uint64_t>(pinned.front().integer(0));
+    KILN_TRY(deliveries, db.query("SELECT count(*) FROM delivery"));
+    counts.deliveries = static_cast<std::uint64_t>(deliveries.front().integer(0));
     return counts;
   });
 }

@@ -142,13 +142,14 @@ Result<bool> Webhooks::deliver_one(const WebhookReceiver& receiver) {
                  "webhook-timestamp: " + std::to_string(sent_s),
                  "webhook-signature: " + webhook_signature(receiver.key, {due->message, sent_s, due->body})};
   const int status = post_webhook(post);
-  const bool over = (status >= 200 && status < 300) || status == kGone;
+  const bool taken = status >= 200 && status < 300;
   const Millis pause = webhook_pause(options_, due->attempt, chance());
   const bool last = due->age + pause > options_.longest;
   const bool cut_off = status == 0 && stopping_;
-  const Result<void> noted =
-      over || (last && !cut_off) ? queue.finish(*due) : queue.retry(*due, cut_off ? Millis(0) : pause);
+  const bool over = taken || status == kGone || (last && !cut_off);
+  const Result<void> noted = over ? queue.finish(*due) : queue.retry(*due, cut_off ? Millis(0) : pause);
   if (!noted) return tl::make_unexpected(noted.error());
+  ++(taken ? delivered_ : over ? failed_ : retried_);
   return true;
 }
 

@@ -23,6 +23,13 @@ struct WebhookOptions {
   Millis look_every{2'000};
 };
 
+/// Messages since start. A fleet's are the sum over its servers.
+struct WebhookCounts {
+  std::uint64_t delivered = 0;  // answered with 2xx
+  std::uint64_t failed = 0;     // given up, or refused for good (410)
+  std::uint64_t retried = 0;    // tries that failed and come again
+};
+
 /// The message of an ended job: {"type": "job.succeeded", "timestamp", "data": {...}}. `job` is gone when it was
 /// removed meanwhile.
 std::string webhook_message(const JobEvent& done, const std::optional<Job>& job);
@@ -39,6 +46,7 @@ class Webhooks {
   void start();
   /// Tries that are under way are cut off, and due again at once.
   void stop();
+  WebhookCounts counts() const { return {delivered_, failed_, retried_}; }
 
  private:
   void look();
@@ -54,6 +62,7 @@ class Webhooks {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::atomic<bool> stopping_{false};
+  std::atomic<std::uint64_t> delivered_{0}, failed_{0}, retried_{0};
   std::vector<std::thread> threads_;
 };
 

@@ -381,6 +381,7 @@ ServiceStats LocalService::stats() {
   stats.deaths_memory = counters_.deaths_memory;
   stats.deaths_timeout = counters_.deaths_timeout;
   stats.bytes_uploaded = counters_.bytes_uploaded;
+  stats.webhooks = webhooks_.counts();
   stats.claim_latency = counters_.claim_latency.snapshot();
   stats.syncs = files_->syncs().snapshot();
   stats.sandbox = sandbox_support();

@@ -95,6 +95,7 @@ struct ServiceStats {
   std::uint64_t retried = 0, reaped = 0, forgotten = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;
+  WebhookCounts webhooks;
   DurationCounts claim_latency;  // created to claimed
   DurationCounts syncs;          // of blobs and their folders
   Sandbox sandbox;               // what this kernel offers to lock workers in

@@ -209,6 +209,17 @@ TEST(OpenApi, EveryReferenceResolvesAndEveryPathParameterIsDescribed) {
   }
 }
 
+TEST(OpenApi, TheQueryOfAnEndpointIsTold) {
+  const auto find = [](std::string_view operation) {
+    return *std::ranges::find(endpoints(), operation, &Endpoint::operation);
+  };
+  EXPECT_EQ(query_names(find("listJobs")), (std::vector<std::string>{"status", "label", "limit", "cursor"}));
+  EXPECT_EQ(query_names(find("getJob")), std::vector<std::string>{"wait"});
+  const auto raw = query_names(find("createJob"));
+  EXPECT_EQ(std::ranges::count(raw, "name"), 1) << "of the scene: another parameter of that name is in the path";
+  EXPECT_TRUE(query_names(find("getBundle")).empty());
+}
+
 TEST(OpenApi, OperationsAreUnique) {
   std::set<std::string_view> names;
   for (const Endpoint& endpoint : endpoints())

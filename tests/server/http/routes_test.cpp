@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/base/sha256.h"
 #include "server/api/endpoints.h"
@@ -228,10 +229,12 @@ TEST(Jobs, AFailedJobCarriesItsProblem) {
   RunningServer server;
   const std::string id = server.make_job();
   server.service().fail(id, {"accessor_out_of_bounds", "an index is too large", "scene.glb: /accessors/3"});
-  const auto job = parse_job(server.get("/v1/jobs/" + id).body);
+  RawReply reply = server.get("/v1/jobs/" + id);
+  const auto job = parse_job(reply.body);
   ASSERT_TRUE(job->error.has_value());
   EXPECT_EQ(job->error->code, "accessor_out_of_bounds");
   EXPECT_EQ(job->error->where, "scene.glb: /accessors/3");
+  EXPECT_EQ(job->error->request_id, reply.fields.at("x-request-id"));
 }
 
 TEST(Plan, TakesWhatAJobTakesAndBakesNothing) {
@@ -395,6 +398,28 @@ TEST(Artifacts, TheBundleIsATarOfAll) {
   EXPECT_EQ(system(("tar -tf " + path + " > /dev/null").c_str()), 0);  // another program reads it
 }
 
+TEST(Query, EveryUnknownNameIsToldAndPagesKeepTheirOwn) {
+  RunningServer server;
+  const auto mistakes = [](const RawReply& reply) {
+    std::set<std::string> pointers;
+    EXPECT_EQ(reply.status, 400) << reply.body;
+    const auto problem = parse_problem(reply.body);
+    for (const FieldError& error : problem->errors) pointers.insert(error.pointer);
+    return pointers;
+  };
+  const std::set<std::string> both{"?colour", "?size"};
+  for (const char* path : {"/v1/jobs", "/v1/jobs/none", "/v1/events", "/v1/presets", "/v1/jobs/none/artifacts"})
+    EXPECT_EQ(mistakes(server.get(std::string(path) + "?colour=red&size=3")), both) << path;
+  EXPECT_EQ(mistakes(server.raw(request_text("POST", "/v1/jobs/none/cancel?size=3&colour", {"Content-Length: 0"}))),
+            both);
+  EXPECT_EQ(mistakes(server.raw(request_text("PUT", "/v1/jobs?preset=prt&colour=red&size=3", {}, "glTF"))), both);
+  EXPECT_EQ(mistakes(server.raw(
+                request_text("POST", "/v1/jobs?preset=prt&seed=1", {"Content-Type: application/json"}, "{}"))),
+            (std::set<std::string>{"?preset", "?seed"}))
+      << "a document says it itself";
+  EXPECT_EQ(server.get("/docs?colour=red").status, 200);
+}
+
 TEST(Documents, DescribeThemselves) {
   RunningServer server;
   const auto presets = json::parse(server.get("/v1/presets").body)["presets"];
@@ -406,6 +431,7 @@ TEST(Documents, DescribeThemselves) {
   EXPECT_EQ(json::parse(server.get("/v1/version").body)["api"], "v1");
   const auto openapi = json::parse(server.get("/openapi.json").body);
   for (const Endpoint& endpoint : endpoints()) EXPECT_TRUE(openapi["paths"].contains(std::string(endpoint.path)));
+  EXPECT_EQ(openapi["webhooks"].size(), 3U);
 }
 
 TEST(Health, IsAliveWhileReadinessTellsEveryReason) {
@@ -425,11 +451,13 @@ TEST(Metrics, AreReadablePrometheusText) {
   server.get("/v1/jobs/none");
   RawReply reply = server.get("/metrics");
   EXPECT_EQ(reply.fields["content-type"], "text/plain; version=0.0.4; charset=utf-8");
-  for (const char* sample : {"kiln_http_problems_total{code=\"not_found\"} 1\n", "kiln_sandbox{lock=\"files\"} ",
-                             "kiln_http_request_seconds_bucket{operation=\"health\",le=\"+Inf\"} 1\n",
-                             "# TYPE kiln_claim_latency_seconds histogram\n", "kiln_fsync_seconds_count ",
-                             "kiln_listen_drops_total ", "kiln_oldest_queued_seconds ", "kiln_attempts_total ",
-                             "kiln_stale_commits_total ", "kiln_worker_deaths_total{cause=\"memory\"} "}) {
+  for (const char* sample :
+       {"kiln_http_problems_total{code=\"not_found\"} 1\n", "kiln_sandbox{lock=\"files\"} ",
+        "kiln_http_request_seconds_bucket{operation=\"health\",le=\"+Inf\"} 1\n",
+        "# TYPE kiln_claim_latency_seconds histogram\n", "kiln_fsync_seconds_count ", "kiln_listen_drops_total ",
+        "kiln_oldest_queued_seconds ", "kiln_attempts_total ", "kiln_stale_commits_total ", "kiln_webhook_pending 0\n",
+        "kiln_webhook_messages_total{outcome=\"failed\"} 0\n", "kiln_webhook_retries_total 0\n",
+        "kiln_worker_deaths_total{cause=\"memory\"} "}) {
     EXPECT_NE(reply.body.find(sample), std::string::npos) << sample;
   }
   EXPECT_NE(reply.body.find("kiln_http_requests_total{operation=\"health\",status=\"200\"} 1\n"), std::string::npos);

@@ -154,6 +154,9 @@ TEST_F(WebhooksTest, WhatFailsComesAgainWithTheSameIdAndBody) {
     EXPECT_EQ(message.id, messages[0].id);
     EXPECT_EQ(message.body, messages[0].body);
   }
+  const WebhookCounts counts = webhooks_->counts();
+  EXPECT_EQ(std::tuple(counts.delivered, counts.retried, counts.failed), std::tuple(1U, 2U, 0U));
+  EXPECT_EQ(store_->counts()->deliveries, 0U);
 }
 
 TEST_F(WebhooksTest, ARestartGoesOnWithWhatWasNotDelivered) {
@@ -162,6 +165,7 @@ TEST_F(WebhooksTest, ARestartGoesOnWithWhatWasNotDelivered) {
   const std::string waiting = canceled_job();
   start(options({receiver.url()}));
   ASSERT_TRUE(receiver.wait_for(1));
+  EXPECT_EQ(store_->counts()->deliveries, 1U);
   webhooks_.reset();
   store_.reset();
   open();
@@ -229,6 +233,8 @@ TEST_F(WebhooksTest, GoneIsTheEndOfAMessageAndADayIsTooLong) {
   std::this_thread::sleep_for(1s);
   EXPECT_EQ(dead.messages().size(), tries);
   EXPECT_EQ(gone.messages().size(), 1U);
+  EXPECT_EQ(webhooks_->counts().failed, 2U);
+  EXPECT_EQ(webhooks_->counts().delivered, 0U);
 }
 
 TEST_F(WebhooksTest, ATenantsReceiverHearsOfItsJobsAlone) {
