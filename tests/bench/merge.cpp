@@ -16,6 +16,7 @@
 #include "core/bake/job_light.h"
 #include "core/mesh/topology.h"
 #include "tests/bench/bench.h"
+#include "tests/core/bake/output_file.h"
 
 namespace kiln {
 namespace {
@@ -43,9 +44,7 @@ SceneFiles smooth(const Mesh& mesh) {
   return {.name = "smooth.ply", .main = Bytes(bytes.begin(), bytes.end())};
 }
 
-const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::ranges::find(output.files, name, &ArtifactFile::name)->bytes;
-}
+using testing::file;
 
 struct Job {
   std::string name;

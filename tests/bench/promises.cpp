@@ -18,6 +18,7 @@
 #include "core/bake/demo_scene.h"
 #include "core/bake/job_light.h"
 #include "core/bake/light_field_certificate.h"
+#include "tests/core/bake/output_file.h"
 
 namespace kiln {
 namespace {
@@ -39,9 +40,7 @@ std::vector<double> parse_targets(const std::string& text) {
   return out;
 }
 
-const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
-}
+using testing::file;
 
 constexpr std::uint64_t kManyRays = 4'000'000'000, kOtherSeed = 4711;
 

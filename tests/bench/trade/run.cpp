@@ -1,6 +1,5 @@
 #include "tests/bench/trade/run.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/baked_scene.h"
@@ -11,6 +10,7 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/trade/child.h"
 #include "tests/bench/trade/csv.h"
+#include "tests/core/bake/output_file.h"
 
 namespace kiln::trade {
 namespace {
@@ -19,9 +19,7 @@ using nlohmann::json;
 
 constexpr std::uint64_t kOtherSeed = 4711;  // bakes have seed 0
 
-const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
-}
+using testing::file;
 
 Error error_of(const ErrorStats& stats) { return {stats.relrmse, stats.interval_low, stats.interval_high}; }
 

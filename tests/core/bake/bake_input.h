@@ -1,13 +1,13 @@
 #pragma once
 // Bakes of the bundled scenes, for the tests of this folder.
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "core/artifact/glb.h"
 #include "core/bake/bake.h"
 #include "core/bake/demo_scene.h"
+#include "tests/core/bake/output_file.h"
 
 namespace kiln::testing {
 
@@ -30,10 +30,6 @@ inline BakeInput finished(const std::string& scene, const std::string& recipe, c
   }
   input.scene.main = *join_glb(document.dump(), Bytes(chunks->binary.begin(), chunks->binary.end()));
   return input;
-}
-
-inline const Bytes& file(const BakeOutput& output, const std::string& name) {
-  return std::find_if(output.files.begin(), output.files.end(), [&](const auto& f) { return f.name == name; })->bytes;
 }
 
 inline nlohmann::json report_of(const BakeOutput& output) { return nlohmann::json::parse(file(output, "report.json")); }
