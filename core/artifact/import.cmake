@@ -16,5 +16,5 @@ kiln_library(kiln_import
           triangle_stream.cpp ply_stream.cpp gltf_stream.cpp
           import_scene.cpp read_scene_files.cpp
           hdr_reader.cpp exr_reader.cpp exr_writer.cpp import_environment.cpp
-  LINKS kiln_reduce kiln_lightfield kiln_scene kiln_mesh kiln_base nlohmann_json::nlohmann_json
+  LINKS kiln_lightfield_data kiln_scene kiln_mesh kiln_base nlohmann_json::nlohmann_json
   PRIVATE_LINKS kiln_tinygltf draco::draco meshoptimizer::meshoptimizer OpenEXR::OpenEXR PNG::PNG JPEG::JPEG)
