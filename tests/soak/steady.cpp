@@ -73,8 +73,9 @@ void run_steady(const Steady& steady, Breaches& breaches) {
     if (job["status"] == "queued" || job["status"] == "running") continue;
     expect_sound(port, job, breaches);
     ++first_open;
-    if (seconds_since(begin) >= steady.seconds * static_cast<double>(samples.size()) / kSamples)
-      samples.push_back(look_at(fleet.node(0).pid(), begin));
+    if (seconds_since(begin) < steady.seconds * static_cast<double>(samples.size()) / kSamples) continue;
+    breaches.expect(http_get(port, "/metrics").status == 200, "no metrics");  // as somebody always scrapes them
+    samples.push_back(look_at(fleet.node(0).pid(), begin));
   }
   const int early = most_descriptors(samples, 0.2, 0.6), late = most_descriptors(samples, 0.6, 1);
   const double slope = slope_of(samples);

@@ -4,7 +4,7 @@ kiln_flags(kiln_sample_scene)
 target_link_libraries(kiln_sample_scene PUBLIC kiln_baked_scene kiln_prt)
 add_executable(kiln-make-sample make_sample.cpp)
 kiln_flags(kiln-make-sample)
-target_link_libraries(kiln-make-sample PRIVATE kiln_sample_scene)
+target_link_libraries(kiln-make-sample PRIVATE kiln_sample_scene kiln_reduce)
 
 kiln_test(baked_scene_test
   SOURCES round_trip_test.cpp baked_shape_test.cpp look_json_test.cpp look_test.cpp png_test.cpp damaged_glb_test.cpp components_glb_test.cpp glossy_glb_test.cpp grid_exr_test.cpp light_field_glb_test.cpp links_glb_test.cpp
