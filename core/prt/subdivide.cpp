@@ -39,10 +39,7 @@ float coarse(float error) {
 class Subdivider {
  public:
   Subdivider(const Mesh& input, const ValueSource& source, const Subdivide& params)
-      : mesh_(std::in_place, input),
-        rows_(source.width),
-        source_(source),
-        params_(params) {
+      : mesh_(std::in_place, input), rows_(source.width), source_(source), params_(params) {
     const std::vector<TransferPoint> points = vertex_points(input);
     for (std::size_t i = 0; i < points.size(); i += kBatch) {
       evaluate(std::span(points).subspan(i, std::min(kBatch, points.size() - i)));
@@ -239,7 +236,8 @@ class Subdivider {
   static constexpr std::size_t kBlock = 256;
   static constexpr int kMostRefused =
       256;  // splits one after another: the budget is full, and each attempt costs memory
-  // Leaves or points at a time: 20 MB not packed yet. The same for any number of threads, since others may compute them.
+  // Leaves or points at a time: 20 MB not packed yet. The same for any number of threads, since others may compute
+  // them.
   static constexpr std::size_t kBatch = 32768;
   std::optional<SplitMesh> mesh_;
   RowStore rows_;  // of every point of mesh_
