@@ -28,6 +28,7 @@
 #include "core/bake/reduce_step.h"
 #include "core/bake/report.h"
 #include "core/bake/transport.h"
+#include "core/base/shared_loop.h"
 
 namespace kiln {
 namespace {
@@ -325,6 +326,7 @@ Result<Pass> bake_passes(const BakeInput& input, CarriedScene in, const std::opt
     const double start = log.seconds();
     const std::uint64_t rays = log.rays();
     log.share(done, done + kShare * (kLast - done));
+    if (threads.shares() != nullptr) threads.shares()->begin_pass();
     KILN_TRY(pass, bake_pass(input, in, light, *next, log, threads));
     passes.add(record_of(pass, log.seconds() - start, log.rays() - rays, before + log.seconds()));
     if (checkpoints.save) checkpoints.save(checkpoint_json(passes.all()));

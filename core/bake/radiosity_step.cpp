@@ -1,7 +1,6 @@
 #include "core/bake/radiosity_step.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 
@@ -38,26 +37,6 @@ RadiosityEffort radiosity_effort(Quality quality) {
       break;
   }
   return {"the final quality", 160'000, 1e-5F, {{64, 512}, 1024}, 1024, 0.01F, 4};
-}
-
-Receiver receiver_at(const TransferPoint& p) { return {ray_origin(p), p.normal}; }
-
-std::vector<Vec3f> light_at(std::span<const TransferPoint> points, const DirectLight& light, std::uint64_t seed,
-                            std::uint64_t& rays, Threads& threads) {
-  std::vector<Vec3f> out(points.size());
-  if (light.none()) return out;
-  const std::vector<std::uint32_t> order = morton_order_of(points);
-  std::atomic<std::uint64_t> sent = 0;
-  threads.for_blocks(points.size(), 128, [&](std::size_t begin, std::size_t end) {
-    std::uint64_t own = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const TransferPoint& p = points[order[i]];
-      out[order[i]] = light.at(receiver_at(p), mix64(seed ^ point_key(p)), own);
-    }
-    sent += own;
-  });
-  rays += sent;
-  return out;
 }
 
 double mean_of(const std::vector<Vec3f>& values) {

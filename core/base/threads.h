@@ -14,6 +14,8 @@ struct Cancelled : std::exception {
   const char* what() const noexcept override { return "cancelled"; }
 };
 
+class LoopShares;  // shared_loop.h
+
 class Threads {
  public:
   /// `count` threads work in every for_blocks; 0 means one for each hardware thread.
@@ -32,6 +34,10 @@ class Threads {
   /// Runs `body` inside this pool's arena (Embree builds use the same threads).
   void run(const std::function<void()>& body);
 
+  /// Who else works on this bake's large loops (shared_loop.h); null: nobody. Must outlive the bake.
+  void share_with(LoopShares* others) { shares_ = others; }
+  LoopShares* shares() const { return shares_; }
+
   /// Safe from any thread and from a signal handler.
   void stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
   bool stopping() const noexcept { return stopping_.load(std::memory_order_relaxed); }
@@ -42,6 +48,7 @@ class Threads {
  private:
   struct Arena;
   std::unique_ptr<Arena> arena_;
+  LoopShares* shares_ = nullptr;
   std::atomic<bool> stopping_{false};
 };
 

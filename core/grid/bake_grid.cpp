@@ -1,10 +1,9 @@
 #include "core/grid/bake_grid.h"
 
 #include <algorithm>
-#include <atomic>
-#include <mutex>
 
 #include "core/base/expects.h"
+#include "core/base/shared_loop.h"
 #include "core/grid/cell_corners.h"
 #include "core/grid/surface_fit.h"
 #include "core/mesh/closest_point.h"
@@ -115,27 +114,34 @@ BakedGrid bake_grid(const SphereGather::World& world, const GridBake& params, Th
   const std::vector<Vec3f> places = gather_places(grid.lattice, scene, threads);
   const SphereGather gather(world, params.content, params.rays, params.seed);
   std::vector<char> valid(places.size());
-  std::atomic<std::uint64_t> rays = 0;
-  std::mutex telling;
-  std::uint64_t done = 0;
-  threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    std::uint64_t own = 0;
-    for (std::size_t v = begin; v < end; ++v) {
-      const GatheredLight light = gather.at(places[v], v, own);
-      valid[v] = light.back <= kBackShare ? 1 : 0;
-      store(light.light, v, grid);
-    }
-    rays += own;
-    const std::lock_guard<std::mutex> one_at_a_time(telling);
-    done += end - begin;
-    if (params.progress) params.progress(done, places.size());
-  });
+  BlockCounts rays(places.size(), kBlock);
+  run_loop({.name = "grid vertices",
+            .items = places.size(),
+            .block = kBlock,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  std::uint64_t own = 0;
+                  for (std::size_t v = begin; v < end; ++v) {
+                    const GatheredLight light = gather.at(places[v], v, own);
+                    valid[v] = light.back <= kBackShare ? 1 : 0;
+                    store(light.light, v, grid);
+                  }
+                  rays.at(begin) = own;
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (auto& part : grid.parts) stream.pass(std::span(part).subspan(begin, end - begin));
+                  stream.pass(std::span(valid).subspan(begin, end - begin));
+                  rays.pass(begin, end, stream);
+                },
+            .progress = params.progress},
+           threads);
   fill_invalid(grid, valid);
   out.stats.invalid = static_cast<std::size_t>(std::count(valid.begin(), valid.end(), 0));
   for (std::size_t v = 0; v < places.size(); ++v) {
     if (places[v] != to_float(grid.lattice.position(grid.lattice.vertex(v)))) ++out.stats.moved;
   }
-  out.stats.rays = rays;
+  out.stats.rays = rays.sum();
   if (params.corners) grid.cells = find_cell_corners(world.tracer, grid.lattice, places, out.stats.rays, threads);
   if (fits_surface(params)) {
     const SurfacePlaces surface{.rays = params.rays / 2, .seed = params.seed};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/shared_loop.h"
 #include "core/grid/cell_corners.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/points.h"
@@ -81,16 +82,28 @@ std::vector<SurfacePlace> gather_surface(const SphereGather::World& world, const
     std::uint64_t rays = 0;
   };
   std::vector<Found> found((samples.size() + kBlock - 1) / kBlock);
-  threads.for_blocks(samples.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    Found& own = found[begin / kBlock];
-    for (std::size_t i = begin; i < end; ++i) {
-      SurfacePoint p = surface_point(scene, samples[i].triangle, samples[i].u, samples[i].v);
-      gathering.add(p, 2 * i, own.places, own.rays);
-      if (!is_double_sided(scene, p.triangle)) continue;
-      p.normal = -p.normal, p.geometric_normal = -p.geometric_normal;
-      gathering.add(p, 2 * i + 1, own.places, own.rays);
-    }
-  });
+  run_loop({.name = "places on the surface",
+            .items = samples.size(),
+            .block = kBlock,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  Found& own = found[begin / kBlock];
+                  for (std::size_t i = begin; i < end; ++i) {
+                    SurfacePoint p = surface_point(scene, samples[i].triangle, samples[i].u, samples[i].v);
+                    gathering.add(p, 2 * i, own.places, own.rays);
+                    if (!is_double_sided(scene, p.triangle)) continue;
+                    p.normal = -p.normal, p.geometric_normal = -p.geometric_normal;
+                    gathering.add(p, 2 * i + 1, own.places, own.rays);
+                  }
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (std::size_t i = begin; i < end; i += kBlock) {
+                    stream.pass(found[i / kBlock].places);
+                    stream.pass(found[i / kBlock].rays);
+                  }
+                }},
+           threads);
   std::vector<SurfacePlace> out;
   for (const Found& own : found) {
     out.insert(out.end(), own.places.begin(), own.places.end());

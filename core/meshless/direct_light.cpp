@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/base/random.h"
+#include "core/base/shared_loop.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 
@@ -87,6 +88,35 @@ Vec3f DirectLight::sky_at(const Receiver& to, std::uint64_t seed, std::uint64_t&
     }
   }
   return to_float(sum / samples);
+}
+
+std::vector<Vec3f> light_at(std::span<const TransferPoint> points, const DirectLight& light, std::uint64_t seed,
+                            std::uint64_t& rays, Threads& threads) {
+  std::vector<Vec3f> out(points.size());
+  if (light.none()) return out;
+  constexpr std::size_t kBlock = 128;
+  const std::vector<std::uint32_t> order = morton_order_of(points);
+  BlockCounts sent(points.size(), kBlock);
+  run_loop({.name = "direct light",
+            .items = points.size(),
+            .block = kBlock,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  std::uint64_t own = 0;
+                  for (std::size_t i = begin; i < end; ++i) {
+                    const TransferPoint& p = points[order[i]];
+                    out[order[i]] = light.at({ray_origin(p), p.normal}, mix64(seed ^ point_key(p)), own);
+                  }
+                  sent.at(begin) = own;
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (std::size_t i = begin; i < end; ++i) stream.pass(out[order[i]]);
+                  sent.pass(begin, end, stream);
+                }},
+           threads);
+  rays += sent.sum();
+  return out;
 }
 
 }  // namespace kiln

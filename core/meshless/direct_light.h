@@ -8,9 +8,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
+#include "core/base/threads.h"
 #include "core/meshless/flat_lamps.h"
 #include "core/prt/direction_sets.h"
+#include "core/prt/transfer_point.h"
 #include "core/scene/environment.h"
 #include "core/trace/environment_sampler.h"
 
@@ -46,5 +50,9 @@ class DirectLight {
   DirectionSets sets_;                        // of the sky's cosine rays
   std::optional<EnvironmentSampler> bright_;  // of a map that has brighter and darker parts
 };
+
+/// Light at points, each with numbers of its own place. Adds the rays sent to `rays`.
+std::vector<Vec3f> light_at(std::span<const TransferPoint>, const DirectLight&, std::uint64_t seed, std::uint64_t& rays,
+                            Threads&);
 
 }  // namespace kiln

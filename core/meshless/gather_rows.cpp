@@ -1,10 +1,10 @@
 #include "core/meshless/gather_rows.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "core/base/random.h"
+#include "core/base/shared_loop.h"
 #include "core/prt/ray_origin.h"
 
 namespace kiln {
@@ -24,23 +24,36 @@ void GatherRows::add(std::span<const TransferPoint> points, Threads& threads, st
   const std::size_t first_row = row_.size(), first_chunk = chunks_.size();
   row_.resize(first_row + points.size());
   chunks_.resize(first_chunk + (points.size() + kChunk - 1) / kChunk);
-  std::atomic<std::uint64_t> sent = 0;
-  threads.for_blocks(points.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    const std::size_t chunk = first_chunk + begin / kChunk;
-    std::vector<RowEntry>& entries = chunks_[chunk];
-    entries.reserve((end - begin) * static_cast<std::size_t>(sets_.samples()));
-    for (std::size_t i = begin; i < end; ++i) {
-      Row& row = row_[first_row + i];
-      row.chunk = static_cast<std::uint32_t>(chunk);
-      row.first = static_cast<std::uint32_t>(entries.size());
-      Work work{entries, row, Random(seed_, point_key(points[i]), 1)};
-      trace(points[i], work);
-      row.count = static_cast<std::uint32_t>(entries.size()) - row.first;
-      sent += work.rays;
-    }
-    entries.shrink_to_fit();
-  });
-  rays += sent;
+  BlockCounts sent(points.size(), kChunk);
+  run_loop({.name = "rows",
+            .items = points.size(),
+            .block = kChunk,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  const std::size_t chunk = first_chunk + begin / kChunk;
+                  std::vector<RowEntry>& entries = chunks_[chunk];
+                  std::uint64_t own = 0;
+                  entries.reserve((end - begin) * static_cast<std::size_t>(sets_.samples()));
+                  for (std::size_t i = begin; i < end; ++i) {
+                    Row& row = row_[first_row + i];
+                    row.chunk = static_cast<std::uint32_t>(chunk);
+                    row.first = static_cast<std::uint32_t>(entries.size());
+                    Work work{entries, row, Random(seed_, point_key(points[i]), 1)};
+                    trace(points[i], work);
+                    row.count = static_cast<std::uint32_t>(entries.size()) - row.first;
+                    own += work.rays;
+                  }
+                  sent.at(begin) = own;
+                  entries.shrink_to_fit();
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  stream.pass(std::span(row_).subspan(first_row + begin, end - begin));
+                  for (std::size_t i = begin; i < end; i += kChunk) stream.pass(chunks_[first_chunk + i / kChunk]);
+                  sent.pass(begin, end, stream);
+                }},
+           threads);
+  rays += sent.sum();
 }
 
 void GatherRows::trace(const TransferPoint& point, Work& work) const {

@@ -1,7 +1,6 @@
 #include "core/meshless/radiosity.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "core/base/expects.h"
@@ -79,21 +78,7 @@ class Solver {
   }
 
   std::vector<Vec3f> direct_at(const std::vector<TransferPoint>& places, const DirectLight& light) {
-    std::vector<Vec3f> out(places.size());
-    if (light.none()) return out;
-    std::atomic<std::uint64_t> rays = 0;
-    const std::vector<std::uint32_t> order = morton_order_of(places);
-    threads_.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      std::uint64_t own = 0;
-      for (std::size_t i = begin; i < end; ++i) {
-        const TransferPoint& p = places[order[i]];
-        const std::uint64_t seed = mix64(params_.seed ^ point_key(p));
-        out[order[i]] = light.at({ray_origin(p), p.normal}, seed, own);
-      }
-      rays += own;
-    });
-    out_.stats.direct_rays += rays;
-    return out;
+    return light_at(places, light, params_.seed, out_.stats.direct_rays, threads_);
   }
 
   /// Gathers at points and keeps what one bounce brings there.

@@ -214,7 +214,7 @@ std::vector<bool> opaque_triangles(const Scene& scene) {
 /// over (the line's length times the size of the triangle). Reflected light, which is not known yet, may change as
 /// well.
 std::vector<double> worths(const Mesh& mesh, std::span<const CutLine> lines, const ValueSource& source) {
-  constexpr std::size_t kBatch = 1024;
+  constexpr std::size_t kBatch = 8192;
   constexpr double kReflected = 1e-4;  // square of what it may change by: a thirtieth of an open point's constant band
   std::vector<double> out;
   out.reserve(lines.size());

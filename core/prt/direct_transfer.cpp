@@ -1,11 +1,11 @@
 #include "core/prt/direct_transfer.h"
 
 #include <array>
-#include <atomic>
 #include <bit>
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/base/shared_loop.h"
 #include "core/prt/direction_sets.h"
 #include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
@@ -139,19 +139,30 @@ std::vector<float> DirectTransferBaker::bake(std::span<const TransferPoint> poin
   const auto width = static_cast<std::size_t>(sh_count(state_->params_.order));
   std::vector<float> out(points.size() * width);
   const std::vector<std::uint32_t> order = morton_order_of(points);
-  std::atomic<std::uint64_t> traced = 0, all_rays = 0;
-  threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    std::uint64_t count = 0, rays = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t v = order[i];
-      count += state_->bake(points[v], point_key(points[v]), rays, out.data() + v * width) ? 1 : 0;
-    }
-    traced += count;
-    all_rays += rays;
-  });
+  BlockCounts traced(points.size(), kBlock), rays(points.size(), kBlock);
+  const auto row = [&](std::size_t i) { return std::span(out).subspan(order[i] * width, width); };
+  run_loop({.name = "direct transfer",
+            .items = points.size(),
+            .block = kBlock,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  std::uint64_t count = 0, sent = 0;
+                  for (std::size_t i = begin; i < end; ++i) {
+                    const TransferPoint& p = points[order[i]];
+                    count += state_->bake(p, point_key(p), sent, row(i).data()) ? 1 : 0;
+                  }
+                  traced.at(begin) = count, rays.at(begin) = sent;
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (std::size_t i = begin; i < end; ++i) stream.pass(row(i));
+                  traced.pass(begin, end, stream);
+                  rays.pass(begin, end, stream);
+                }},
+           threads);
   if (stats != nullptr) {
-    stats->rays += all_rays;
-    stats->open_points += points.size() - traced;
+    stats->rays += rays.sum();
+    stats->open_points += points.size() - traced.sum();
   }
   return out;
 }

@@ -1,5 +1,6 @@
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/base/shared_loop.h"
 #include "core/prt/interreflection.h"
 #include "core/prt/lamps.h"
 #include "core/prt/ray_origin.h"
@@ -14,14 +15,23 @@ std::vector<Vec3f> bake_fixed_direct(const Tracer& tracer, std::span<const Trans
   if (lamps.none()) return out;
   constexpr std::size_t kBlock = 64;
   const std::vector<std::uint32_t> order = morton_order_of(points);
-  threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const TransferPoint& p = points[order[i]];
-      const Receiver receiver{ray_origin(p), p.normal};
-      const std::uint64_t seed = mix64(params.seed ^ point_key(p));
-      out[order[i]] = lamps.punctual(receiver) + lamps.emitted(receiver, params.samples, seed);
-    }
-  });
+  run_loop({.name = "light of lamps",
+            .items = points.size(),
+            .block = kBlock,
+            .body =
+                [&](std::size_t begin, std::size_t end) {
+                  for (std::size_t i = begin; i < end; ++i) {
+                    const TransferPoint& p = points[order[i]];
+                    const Receiver receiver{ray_origin(p), p.normal};
+                    const std::uint64_t seed = mix64(params.seed ^ point_key(p));
+                    out[order[i]] = lamps.punctual(receiver) + lamps.emitted(receiver, params.samples, seed);
+                  }
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (std::size_t i = begin; i < end; ++i) stream.pass(out[order[i]]);
+                }},
+           threads);
   if (stats != nullptr) {
     const int emitter_rays = lamps.has_emitters() ? params.samples + cosine_share(params.samples) : 0;
     stats->rays += points.size() * (tracer.scene().lights.size() + static_cast<std::size_t>(emitter_rays));

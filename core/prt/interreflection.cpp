@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
 
 #include "core/base/expects.h"
+#include "core/base/shared_loop.h"
 #include "core/mesh/topology.h"
 #include "core/prt/gather.h"
 #include "core/prt/morton.h"
@@ -168,18 +168,38 @@ class Solver {
       for (const DirectionSets& s : sets)
         sources.push_back({tracer_, lamps_, faces_, albedo_, s, light.rows, light.fixed, params_.order, out_.channels,
                            pass, params_.seed, spot_source_ ? &*spot_source_ : nullptr});
-      std::atomic<std::uint64_t> rays = 0;
-      threads.for_blocks(order_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-        std::vector<Gatherer> gatherers(sources.begin(), sources.end());
-        for (std::size_t i = begin; i < end; ++i) update(order_[i], gatherers[share_[order_[i]]], pass, next);
-        for (const Gatherer& g : gatherers) rays += g.rays();
-      });
+      const std::uint64_t rays = gather_all(sources, pass, next, threads);
       if (stats != nullptr) stats->rays += rays;
       if (noise != nullptr && pass + 1 == params_.bounces) noise->difference = draw_probes_twice(sources);
       std::swap(light, next);
       sent += static_cast<std::uint64_t>(sets.front().samples());
       if (params_.progress) params_.progress(sent, rays_per_vertex(params_));
     }
+  }
+
+  /// One pass over all vertices, into `next`. Returns the rays sent.
+  std::uint64_t gather_all(const std::vector<GatherSource>& sources, int pass, Layer& next, Threads& threads) const {
+    BlockCounts rays(order_.size(), kBlock);
+    run_loop({.name = "reflections",
+              .items = order_.size(),
+              .block = kBlock,
+              .body =
+                  [&](std::size_t begin, std::size_t end) {
+                    std::vector<Gatherer> gatherers(sources.begin(), sources.end());
+                    for (std::size_t i = begin; i < end; ++i)
+                      update(order_[i], gatherers[share_[order_[i]]], pass, next);
+                    for (const Gatherer& g : gatherers) rays.at(begin) += g.rays();
+                  },
+              .pass =
+                  [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                    for (std::size_t i = begin; i < end; ++i) {
+                      stream.pass(next.rows.numbers(order_[i]));
+                      if (!next.fixed.empty()) stream.pass(next.fixed[order_[i]]);
+                    }
+                    rays.pass(begin, end, stream);
+                  }},
+             threads);
+    return rays.sum();
   }
 
   std::vector<DirectionSets> shared_sets(int samples) const {

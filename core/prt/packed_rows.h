@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace kiln {
@@ -26,6 +27,10 @@ class PackedRows {
   float unit(int i) const { return unit_[static_cast<std::size_t>(i)]; }
 
   const std::int16_t* row(std::size_t r) const { return reinterpret_cast<const std::int16_t*>(first_ + r * pitch_); }
+  /// A row as it lies there, padding included.
+  std::span<std::int16_t> numbers(std::size_t r) {
+    return {reinterpret_cast<std::int16_t*>(first_ + r * pitch_), static_cast<std::size_t>(stride_)};
+  }
   void store(std::size_t r, const float* values);
   void load(std::size_t r, float* values) const;
 

@@ -38,15 +38,11 @@ float coarse(float error) {
 
 class Subdivider {
  public:
-  Subdivider(const Mesh& input, const ValueSource& source, const Subdivide& params, const Threads& threads)
-      : mesh_(std::in_place, input),
-        rows_(source.width),
-        source_(source),
-        params_(params),
-        batch_(kBatch * static_cast<std::size_t>(threads.count())) {
+  Subdivider(const Mesh& input, const ValueSource& source, const Subdivide& params)
+      : mesh_(std::in_place, input), rows_(source.width), source_(source), params_(params) {
     const std::vector<TransferPoint> points = vertex_points(input);
-    for (std::size_t i = 0; i < points.size(); i += batch_) {
-      evaluate(std::span(points).subspan(i, std::min(batch_, points.size() - i)));
+    for (std::size_t i = 0; i < points.size(); i += kBatch) {
+      evaluate(std::span(points).subspan(i, std::min(kBatch, points.size() - i)));
     }
   }
 
@@ -155,7 +151,7 @@ class Subdivider {
     while (seen_leaves_ < end) {
       threads.check();
       std::vector<std::uint32_t> fresh;
-      for (; seen_leaves_ < end && fresh.size() < batch_; ++seen_leaves_) {
+      for (; seen_leaves_ < end && fresh.size() < kBatch; ++seen_leaves_) {
         if (mesh_->leaves()[seen_leaves_].depth < params_.max_depth) fresh.push_back(seen_leaves_);
       }
       const std::vector<float> error =
@@ -240,12 +236,13 @@ class Subdivider {
   static constexpr std::size_t kBlock = 256;
   static constexpr int kMostRefused =
       256;  // splits one after another: the budget is full, and each attempt costs memory
-  static constexpr std::size_t kBatch = 512;  // leaves or points at a time and thread: 0.3 MB not packed yet
+  // Leaves or points at a time: 20 MB not packed yet. The same for any number of threads, since others may compute
+  // them.
+  static constexpr std::size_t kBatch = 32768;
   std::optional<SplitMesh> mesh_;
   RowStore rows_;  // of every point of mesh_
   const ValueSource& source_;
   const Subdivide& params_;
-  std::size_t batch_;
   std::priority_queue<Candidate, std::deque<Candidate>> queue_;
   std::uint32_t seen_leaves_ = 0;
   int refused_ = 0;
@@ -281,7 +278,7 @@ Subdivided subdivide(const Mesh& input, const ValueSource& source, const Subdivi
   EXPECTS(params.max_depth >= 0 && params.max_depth <= kMaxSplitDepth);
   if (params.triangles <= input.triangles.size() || params.max_depth == 0)
     return sample_vertices(input, source, threads);
-  Subdivider subdivider(input, source, params, threads);
+  Subdivider subdivider(input, source, params);
   subdivider.run(threads);
   return subdivider.finish(input.position.size(), threads);
 }

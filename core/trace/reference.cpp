@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/base/shared_loop.h"
 #include "core/sphere/sampling.h"
 #include "core/sphere/sh.h"
 #include "core/trace/environment_sampler.h"
@@ -282,24 +282,36 @@ ReferenceResult estimate(const Estimator& estimator, std::size_t points, const R
   const int half = (options.samples + 1) / 2;
   const std::vector<Vec3d> zero(lightings * points);
   ReferenceResult result{zero, zero, zero};
-  std::atomic<std::uint64_t> vertices = 0;
-
-  threads.for_blocks(points, 1, [&](std::size_t point, std::size_t) {
-    std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
-    std::uint64_t visited = 0;
-    for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
-      PathNumbers numbers(options.seed, point, sample);
-      visited += static_cast<std::uint64_t>(add(point, numbers, sums[sample % 2]));
-    }
-    vertices += visited;
-    for (std::size_t k = 0; k < lightings; ++k) {
-      const std::size_t i = k * points + point;
-      result.half_a[i] = sums[0][k] / half;
-      result.half_b[i] = sums[1][k] / half;
-      result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
-    }
-  });
-  result.rays = vertices * estimator.rays_per_vertex();
+  BlockCounts vertices(points, 1);
+  run_loop({.name = "reference",
+            .items = points,
+            .body =
+                [&](std::size_t point, std::size_t) {
+                  std::array<std::vector<Vec3d>, 2> sums{std::vector<Vec3d>(lightings), std::vector<Vec3d>(lightings)};
+                  std::uint64_t visited = 0;
+                  for (std::uint64_t sample = 0; sample < 2 * static_cast<std::uint64_t>(half); ++sample) {
+                    PathNumbers numbers(options.seed, point, sample);
+                    visited += static_cast<std::uint64_t>(add(point, numbers, sums[sample % 2]));
+                  }
+                  vertices.at(point) = visited;
+                  for (std::size_t k = 0; k < lightings; ++k) {
+                    const std::size_t i = k * points + point;
+                    result.half_a[i] = sums[0][k] / half;
+                    result.half_b[i] = sums[1][k] / half;
+                    result.value[i] = (result.half_a[i] + result.half_b[i]) / 2.0;
+                  }
+                },
+            .pass =
+                [&](std::size_t begin, std::size_t end, ItemStream& stream) {
+                  for (std::size_t i = begin; i < end; ++i) {
+                    for (auto* values : {&result.half_a, &result.half_b, &result.value}) {
+                      for (std::size_t k = 0; k < lightings; ++k) stream.pass((*values)[k * points + i]);
+                    }
+                  }
+                  vertices.pass(begin, end, stream);
+                }},
+           threads);
+  result.rays = vertices.sum() * estimator.rays_per_vertex();
   return result;
 }
 

@@ -86,6 +86,7 @@ void add_jobs(Families& to, const MetricsInput& in) {
           {"cached", real(s.cached)}});
   to.counter("attempts_total", "Attempts started.", s.claimed);
   to.histogram("claim_latency_seconds", "From creation to claim.", s.claim_latency);
+  to.counter("parts_total", "Ranges of bakes computed for whoever gave them away.", s.parts);
   to.counter("retries_total", "Attempts that will be repeated.", s.retried);
   to.counter("reaped_total", "Leases that ended without a word.", s.reaped);
   to.counter("forgotten_total", "Jobs whose time was over by the retention in force.", s.forgotten);

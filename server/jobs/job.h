@@ -53,6 +53,13 @@ struct JobError {
   int status = 500;
 };
 
+/// A range of a loop of another job, for whoever has time (server/work/parts.h). It ends with that job, if not before.
+struct JobPart {
+  std::string parent;   // that job's id
+  std::string order;    // what to compute, JSON
+  std::string journal;  // blob: what the loops before it made
+};
+
 /// Times are milliseconds since 1970 (UTC) by the store's clock; 0 stands for "not yet".
 struct Job {
   std::string id;  // ULID: 26 letters, sorts by creation time
@@ -74,6 +81,8 @@ struct Job {
   std::optional<JobProgress> progress;  // while running
   std::optional<JobError> error;        // exactly when failed
   std::vector<Artifact> artifacts;      // exactly when succeeded
+  std::optional<JobPart> part;          // when it is no bake of its own
+  std::uint64_t memory_mb = 0;          // that it may use; 0: of a job from before this was kept
 };
 
 }  // namespace kiln

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -33,6 +34,13 @@ struct NewJob {
   std::string request_hash;     // of the whole request; a key met again with another hash is refused
   int max_queued = 0;           // refuse with "queue_full" when so many wait already; 0: no limit
   int max_open = 0;             // refuse with "quota" when the tenant has so many queued or running; 0: no limit
+  std::uint64_t memory_mb = 0;  // that it may use
+};
+
+/// A blob that the store is to know.
+struct StoredJournal {
+  std::string sha256;
+  std::uint64_t bytes = 0;
 };
 
 struct Created {
@@ -50,6 +58,27 @@ struct ClaimRef {
 struct Claim {
   ClaimRef ref;
   Job job;
+};
+
+/// Who claims, and what he can take.
+struct Taker {
+  std::string maker;  // whoever has the same word computes the same bits: parts of others are not for him
+  std::uint64_t free_mb = std::numeric_limits<std::uint64_t>::max();  // memory not given to jobs yet
+  bool idle = true;         // runs nothing: takes the next job, however much memory that may use
+  Millis patience{30'000};  // smaller jobs overtake one that has no room, until it has waited for so long
+};
+
+/// Ranges of a loop that a running job gives away.
+struct NewParts {
+  std::vector<std::string> orders;  // of each range, JSON
+  std::string maker;                // see Taker
+  StoredJournal journal;
+};
+
+struct PartState {
+  std::string id, order;
+  JobState state = JobState::queued;
+  std::string sha256;  // of its result, once succeeded
 };
 
 enum class Beat { ok, lost, cancel_requested };
@@ -109,9 +138,9 @@ class JobStore {
   /// Every input must be a blob that the tenant brought or baked (touch_blob, commit).
   virtual Result<Created> create(const NewJob&) = 0;
 
-  /// A job that is due, now running under a lease; nothing when none is. Of the tenant with the fewest running jobs,
-  /// the oldest.
-  virtual Result<std::optional<Claim>> claim(Millis lease) = 0;
+  /// A job that is due, now running under a lease; nothing when none is, or none that the taker has room for. Of the
+  /// tenant with the fewest running jobs the oldest; parts come after jobs, since these go on without help.
+  virtual Result<std::optional<Claim>> claim(Millis lease, const Taker&) = 0;
   virtual Result<Beat> heartbeat(const ClaimRef&, Millis lease, const std::optional<JobProgress>&) = 0;
   virtual Result<Wrote> commit(const ClaimRef&, std::span<const Artifact>, bool cached) = 0;
   virtual Result<Wrote> fail(const ClaimRef&, const JobError&) = 0;
@@ -120,6 +149,16 @@ class JobStore {
   virtual Result<Wrote> release(const ClaimRef&) = 0;
   /// Ends a running job whose cancellation was asked for, once its worker is gone.
   virtual Result<Wrote> finish_cancel(const ClaimRef&) = 0;
+
+  /// Gives ranges of a running job away, as jobs of their own with its inputs and recipe. They are nobody's business:
+  /// in no list, count, quota or stream of all events. When the job ends they go, running or not.
+  virtual Result<Wrote> add_parts(const ClaimRef& parent, const NewParts&) = 0;
+  /// What became of them, oldest first.
+  virtual Result<std::vector<PartState>> parts(const std::string& parent) = 0;
+  /// The job goes on where they are of no use.
+  virtual Result<void> forget_parts(const std::string& parent) = 0;
+  /// This one, for the job itself to compute; nothing when it does not wait any more.
+  virtual Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) = 0;
 
   /// Requeues (or cancels, when asked for) jobs whose lease ended; with `everything` all running ones. Returns how
   /// many.

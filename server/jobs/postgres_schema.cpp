@@ -3,7 +3,7 @@
 namespace kiln::sql {
 namespace {
 
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 
 // The same columns, checks and triggers as in sqlite_schema.cpp. What differs:
 // - Events get their ids while the writer holds a lock to the end of its transaction: ids grow in the order in which
@@ -132,6 +132,18 @@ CREATE TABLE kiln.upload_day(
 UPDATE kiln.meta SET version=2;
 )sql";
 
+// From version 2 to 3: parts of jobs, and how much memory a job may use.
+constexpr const char* kVersion3 = R"sql(
+ALTER TABLE kiln.job ADD COLUMN memory_mb BIGINT NOT NULL DEFAULT 0;
+ALTER TABLE kiln.job ADD COLUMN parent kiln.word REFERENCES kiln.job(id) ON DELETE CASCADE;
+ALTER TABLE kiln.job ADD COLUMN part_order kiln.word;
+ALTER TABLE kiln.job ADD COLUMN maker kiln.word;
+ALTER TABLE kiln.job ADD COLUMN journal kiln.word REFERENCES kiln.blob(sha256);
+CREATE INDEX job_by_parent ON kiln.job(parent, id) WHERE parent IS NOT NULL;
+CREATE INDEX job_by_journal ON kiln.job(journal) WHERE journal IS NOT NULL;
+UPDATE kiln.meta SET version=3;
+)sql";
+
 // A table that older programs need not know, so it comes without a new version.
 constexpr const char* kDeliveries = R"sql(
 CREATE TABLE kiln.delivery(
@@ -154,13 +166,13 @@ Result<void> make_or_check(PostgresConnection& db) {
     KILN_DO(db.execute(kTables));
   }
   KILN_TRY(version, db.query("SELECT version FROM kiln.meta"));
-  if (version.front().integer(0) == 1) {
-    KILN_DO(db.execute(kVersion2));
-  } else if (version.front().integer(0) != kVersion) {
+  const auto known = version.front().integer(0);
+  if (known < 1 || known > kVersion) {
     return fault("schema_too_new", "the job store was written by another version of this program (schema " +
-                                       std::to_string(version.front().integer(0)) + ", this one knows " +
-                                       std::to_string(kVersion) + ")");
+                                       std::to_string(known) + ", this one knows " + std::to_string(kVersion) + ")");
   }
+  if (known < 2) KILN_DO(db.execute(kVersion2));
+  if (known < 3) KILN_DO(db.execute(kVersion3));
   KILN_TRY(deliveries, db.query("SELECT to_regclass('kiln.delivery')::text"));
   if (!deliveries.front().is_null(0)) return {};
   return db.execute(kDeliveries);

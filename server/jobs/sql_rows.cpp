@@ -53,7 +53,7 @@ const char* const kJobColumns =
     "id, state, tenant, label, recipe, content_key, force, cached, cancel_requested_at, attempt, crashes, retries, "
     "created_at, "
     "started_at, finished_at, version, stage, done, total, fraction, eta_s, error_code, error_message, error_where, "
-    "error_status, pinned";
+    "error_status, pinned, parent, part_order, journal, memory_mb";
 
 Job read_job(const Row& row) {
   Job job;
@@ -76,6 +76,8 @@ Job read_job(const Row& row) {
   if (job.state == JobState::running) job.progress = read_progress(row, 16);
   job.error = read_error(row, 21);
   job.pinned = row.integer(25) != 0;
+  if (!row.is_null(26)) job.part = JobPart{row.text(26), row.text(27), row.text(28)};
+  job.memory_mb = static_cast<std::uint64_t>(row.integer(29));
   return job;
 }
 
@@ -128,6 +130,16 @@ Result<std::uint64_t> append_event(Connection& db, const NewEvent& event, std::i
   const std::int64_t id = rows.front().integer(0);
   KILN_DO(db.run("UPDATE job SET version=? WHERE id=?", id, event.job_id));
   return static_cast<std::uint64_t>(id);
+}
+
+Result<void> append_end(Connection& db, const Ending& end, std::int64_t now_ms) {
+  KILN_DO(append_event(db, {end.job_id, EventKind::state, end.state, end.message}, now_ms));
+  for (const Artifact& artifact : end.artifacts) {
+    KILN_DO(append_event(db, {end.job_id, EventKind::artifact, end.state, artifact.name}, now_ms));
+  }
+  KILN_DO(append_event(db, {end.job_id, EventKind::done, end.state, end.message}, now_ms));
+  KILN_DO(db.run("DELETE FROM job WHERE parent=?", end.job_id));
+  return {};
 }
 
 }  // namespace kiln::sql

@@ -37,4 +37,14 @@ struct NewEvent {
 /// Appends an event and makes it the job's version.
 Result<std::uint64_t> append_event(Connection&, const NewEvent&, std::int64_t now_ms);
 
+/// A job reached a terminal state.
+struct Ending {
+  std::string job_id;
+  JobState state = JobState::failed;
+  std::string message = {};
+  std::span<const Artifact> artifacts = {};
+};
+/// The events that tell of it; its parts are over.
+Result<void> append_end(Connection&, const Ending&, std::int64_t now_ms);
+
 }  // namespace kiln::sql

@@ -20,13 +20,17 @@ class SqlStore final : public JobStore {
 
   Result<Created> create(const NewJob&) override;
 
-  Result<std::optional<Claim>> claim(Millis lease) override;
+  Result<std::optional<Claim>> claim(Millis lease, const Taker&) override;
   Result<Beat> heartbeat(const ClaimRef&, Millis lease, const std::optional<JobProgress>&) override;
   Result<Wrote> commit(const ClaimRef&, std::span<const Artifact>, bool cached) override;
   Result<Wrote> fail(const ClaimRef&, const JobError&) override;
   Result<Wrote> retry(const ClaimRef&, const Retry&) override;
   Result<Wrote> release(const ClaimRef&) override;
   Result<Wrote> finish_cancel(const ClaimRef&) override;
+  Result<Wrote> add_parts(const ClaimRef& parent, const NewParts&) override;
+  Result<std::vector<PartState>> parts(const std::string& parent) override;
+  Result<void> forget_parts(const std::string& parent) override;
+  Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) override;
   Result<int> reap(bool everything) override;
 
   Result<Job> cancel(const std::string& id) override;
@@ -83,6 +87,8 @@ class SqlStore final : public JobStore {
     return std::move(*result);
   }
 
+  /// The queued job is running now, under a new claim.
+  Result<Claim> take(Connection&, const std::string& id, Millis lease, std::int64_t now);
   Result<Wrote> requeue(const ClaimRef&, const Retry&, const char* counters);
 
   std::unique_ptr<Engine> engine_;
@@ -93,8 +99,6 @@ class SqlStore final : public JobStore {
 
 /// Artefacts of the newest success with this key.
 Result<std::vector<Artifact>> find_result_in(Connection&, const std::string& content_key);
-/// The events that tell of a success.
-Result<void> append_success(Connection&, const std::string& job_id, std::span<const Artifact>, std::int64_t now_ms);
 /// The blob exists, the tenant has it (if there is one), and it was referred to now.
 struct BlobNote {
   std::string sha256;

@@ -1,5 +1,7 @@
 // What a worker's supervisor does to its claim. Every statement names id, token and fence: no match, no effect.
 
+#include <algorithm>
+#include <limits>
 #include <map>
 
 #include "server/jobs/sql_store.h"
@@ -18,33 +20,60 @@ std::string update(const std::string& assignments, const char* condition = kNotC
 
 }  // namespace
 
-Result<std::optional<Claim>> SqlStore::claim(Millis lease) {
+namespace {
+
+/// Jobs that are due and may be this taker's.
+constexpr const char* kDue =
+    " FROM job WHERE state='queued' AND run_after<=? AND (parent IS NULL OR maker=?) AND memory_mb<=?";
+constexpr const char* kFairly =
+    " ORDER BY (SELECT count(*) FROM job other WHERE other.state='running' AND other.tenant=job.tenant), "
+    "parent IS NOT NULL, id LIMIT 1";
+constexpr std::uint64_t kAnyMemory = std::numeric_limits<std::int64_t>::max();
+
+/// The next job by fairness, if there is room for it; a smaller one while that has not waited for long.
+Result<std::optional<std::string>> choose(Connection& db, const Taker& taker, const char* keep_rows, std::int64_t now) {
+  const std::string next = std::string("SELECT id, memory_mb, run_after") + kDue + kFairly + keep_rows;
+  KILN_TRY(rows, db.query(next, now, taker.maker, kAnyMemory));
+  if (rows.empty()) return std::nullopt;
+  const std::uint64_t room = std::min(taker.free_mb, kAnyMemory);
+  if (taker.idle || static_cast<std::uint64_t>(rows.front().integer(1)) <= room) return rows.front().text(0);
+  if (now - rows.front().integer(2) > taker.patience.count()) return std::nullopt;
+  KILN_TRY(smaller, db.query(next, now, taker.maker, room));
+  if (smaller.empty()) return std::nullopt;
+  return smaller.front().text(0);
+}
+
+}  // namespace
+
+Result<Claim> SqlStore::take(Connection& db, const std::string& id, Millis lease, std::int64_t now) {
+  KILN_TRY(fence, db.query("UPDATE counter SET value=value+1 WHERE name='fence' RETURNING value"));
+  Claim claim;
+  claim.ref = {id, random_token(), fence.front().integer(0)};
+  KILN_DO(
+      db.run("UPDATE job SET state='running', attempt=attempt+1, lease_owner=?, lease_until=?, fence=?, "
+             "started_at=? WHERE id=?",
+             claim.ref.token, now + lease.count(), claim.ref.fence, now, id));
+  KILN_TRY(job, find_job(db, id));
+  const std::string which = "attempt " + std::to_string(job->attempt);
+  KILN_TRY(version, append_event(db, {id, EventKind::state, JobState::running, which}, now));
+  claim.job = *job;
+  claim.job.version = version;
+  return claim;
+}
+
+Result<std::optional<Claim>> SqlStore::claim(Millis lease, const Taker& taker) {
   // Look first: an idle worker costs no write.
   KILN_TRY(due, read([&](Connection& db) -> Result<bool> {
              KILN_TRY(now, db.now_ms());
-             KILN_TRY(rows, db.query("SELECT 1 FROM job WHERE state='queued' AND run_after<=? LIMIT 1", now));
+             const std::uint64_t room = taker.idle ? kAnyMemory : std::min(taker.free_mb, kAnyMemory);
+             KILN_TRY(rows, db.query(std::string("SELECT 1") + kDue + " LIMIT 1", now, taker.maker, room));
              return !rows.empty();
            }));
   if (!due) return std::nullopt;
   return write([&](Connection& db, std::int64_t now) -> Result<std::optional<Claim>> {
-    const std::string next =
-        "SELECT id FROM job WHERE state='queued' AND run_after<=? ORDER BY (SELECT count(*) FROM job other "
-        "WHERE other.state='running' AND other.tenant=job.tenant), id LIMIT 1";
-    KILN_TRY(rows, db.query(next + engine_->keep_rows(true), now));
-    if (rows.empty()) return std::nullopt;
-    KILN_TRY(fence, db.query("UPDATE counter SET value=value+1 WHERE name='fence' RETURNING value"));
-    Claim claim;
-    claim.ref = {rows.front().text(0), random_token(), fence.front().integer(0)};
-    KILN_DO(
-        db.run("UPDATE job SET state='running', attempt=attempt+1, lease_owner=?, lease_until=?, fence=?, "
-               "started_at=? WHERE id=?",
-               claim.ref.token, now + lease.count(), claim.ref.fence, now, claim.ref.job_id));
-    KILN_TRY(job, find_job(db, claim.ref.job_id));
-    const std::string which = "attempt " + std::to_string(job->attempt);
-    KILN_TRY(version, append_event(db, {claim.ref.job_id, EventKind::state, JobState::running, which}, now));
-    claim.job = *job;
-    claim.job.version = version;
-    return claim;
+    KILN_TRY(id, choose(db, taker, engine_->keep_rows(true), now));
+    if (!id) return std::nullopt;
+    return take(db, *id, lease, now);
   });
 }
 
@@ -60,16 +89,6 @@ Result<Beat> SqlStore::heartbeat(const ClaimRef& ref, Millis lease, const std::o
     KILN_TRY(rows, db.query("SELECT cancel_requested_at FROM job WHERE id=?", ref.job_id));
     return rows.front().is_null(0) ? Beat::ok : Beat::cancel_requested;
   });
-}
-
-Result<void> append_success(Connection& db, const std::string& job_id, std::span<const Artifact> artifacts,
-                            std::int64_t now) {
-  KILN_DO(append_event(db, {job_id, EventKind::state, JobState::succeeded, ""}, now));
-  for (const Artifact& artifact : artifacts) {
-    KILN_DO(append_event(db, {job_id, EventKind::artifact, JobState::succeeded, artifact.name}, now));
-  }
-  KILN_DO(append_event(db, {job_id, EventKind::done, JobState::succeeded, ""}, now));
-  return {};
 }
 
 Result<Wrote> SqlStore::commit(const ClaimRef& ref, std::span<const Artifact> artifacts, bool cached) {
@@ -88,7 +107,7 @@ Result<Wrote> SqlStore::commit(const ClaimRef& ref, std::span<const Artifact> ar
     const std::string tenant = owner.front().text(0);
     for (const auto& [sha256, bytes] : sorted) KILN_DO(note_blob(db, {sha256, bytes, tenant}, now));
     KILN_DO(insert_artifacts(db, ref.job_id, artifacts, ref.fence));
-    KILN_DO(append_success(db, ref.job_id, artifacts, now));
+    KILN_DO(append_end(db, {ref.job_id, JobState::succeeded, "", artifacts}, now));
     return Wrote::done;
   });
 }
@@ -101,8 +120,7 @@ Result<Wrote> SqlStore::fail(const ClaimRef& ref, const JobError& error) {
     KILN_TRY(mine, db.run(statement, now, error.fault.code, error.fault.message, error.fault.where, error.status,
                           ref.job_id, ref.token, ref.fence));
     if (mine == 0) return Wrote::lost;
-    KILN_DO(append_event(db, {ref.job_id, EventKind::state, JobState::failed, error.fault.code}, now));
-    KILN_DO(append_event(db, {ref.job_id, EventKind::done, JobState::failed, error.fault.code}, now));
+    KILN_DO(append_end(db, {ref.job_id, JobState::failed, error.fault.code}, now));
     return Wrote::done;
   });
 }
@@ -132,8 +150,7 @@ Result<Wrote> SqlStore::finish_cancel(const ClaimRef& ref) {
         update(std::string("state='canceled', finished_at=?, ") + kClearRun, " AND cancel_requested_at IS NOT NULL");
     KILN_TRY(mine, db.run(statement, now, ref.job_id, ref.token, ref.fence));
     if (mine == 0) return Wrote::lost;
-    KILN_DO(append_event(db, {ref.job_id, EventKind::state, JobState::canceled, ""}, now));
-    KILN_DO(append_event(db, {ref.job_id, EventKind::done, JobState::canceled, ""}, now));
+    KILN_DO(append_end(db, {ref.job_id, JobState::canceled}, now));
     return Wrote::done;
   });
 }
@@ -144,14 +161,11 @@ Result<void> reap_one(Connection& db, const std::string& id, const char* why, st
   const std::string cancel = std::string("UPDATE job SET state='canceled', finished_at=?, ") + kClearRun +
                              " WHERE id=? AND cancel_requested_at IS NOT NULL";
   KILN_TRY(canceled, db.run(cancel, now, id));
-  if (canceled > 0) {
-    KILN_DO(append_event(db, {id, EventKind::state, JobState::canceled, ""}, now));
-    KILN_DO(append_event(db, {id, EventKind::done, JobState::canceled, ""}, now));
-    return {};
-  }
+  if (canceled > 0) return append_end(db, {id, JobState::canceled}, now);
   const std::string requeue =
       std::string("UPDATE job SET state='queued', started_at=NULL, run_after=?, ") + kClearRun + " WHERE id=?";
-  KILN_DO(db.run(requeue, now, id));
+  KILN_TRY(there, db.run(requeue, now, id));
+  if (there == 0) return {};  // a part that ended with its job
   KILN_DO(append_event(db, {id, EventKind::state, JobState::queued, why}, now));
   return {};
 }

@@ -55,7 +55,7 @@ Result<void> refuse_poison(Connection& db, const NewJob& request, std::int64_t n
 
 Result<void> refuse_full_queue(Connection& db, int max_queued) {
   if (max_queued <= 0) return {};
-  KILN_TRY(rows, db.query("SELECT count(*) FROM job WHERE state='queued'"));
+  KILN_TRY(rows, db.query("SELECT count(*) FROM job WHERE state='queued' AND parent IS NULL"));
   if (rows.front().integer(0) < max_queued) return {};
   return fault("queue_full", "the queue is full: " + std::to_string(max_queued) + " jobs wait already");
 }
@@ -63,17 +63,18 @@ Result<void> refuse_full_queue(Connection& db, int max_queued) {
 Result<void> refuse_over_quota(Connection& db, const NewJob& request) {
   if (request.max_open <= 0) return {};
   KILN_TRY(rows,
-           db.query("SELECT count(*) FROM job WHERE tenant=? AND state IN ('queued', 'running')", request.tenant));
+           db.query("SELECT count(*) FROM job WHERE tenant=? AND state IN ('queued', 'running') AND parent IS NULL",
+                    request.tenant));
   if (rows.front().integer(0) < request.max_open) return {};
   return fault("quota", "this token may have " + std::to_string(request.max_open) + " unfinished jobs at a time");
 }
 
 Result<void> insert_job(Connection& db, const Job& job, const NewJob& request, std::int64_t now) {
   KILN_DO(db.run(
-      "INSERT INTO job(id, state, tenant, label, recipe, content_key, force, created_at, run_after, request_hash) "
-      "VALUES(?,'queued',?,?,?,?,?,?,?,?)",
-      job.id, job.tenant, job.label, job.recipe, job.content_key, job.force, job.created_ms, now,
-      request.request_hash));
+      "INSERT INTO job(id, state, tenant, label, recipe, content_key, force, created_at, run_after, request_hash, "
+      "memory_mb) VALUES(?,'queued',?,?,?,?,?,?,?,?,?)",
+      job.id, job.tenant, job.label, job.recipe, job.content_key, job.force, job.created_ms, now, request.request_hash,
+      request.memory_mb));
   if (!request.idempotency_key.empty()) {
     KILN_DO(db.run("UPDATE job SET idempotency_key=? WHERE id=?", stored_key(request), job.id));
   }
@@ -115,7 +116,7 @@ Result<Created> SqlStore::create(const NewJob& request) {
     if (!known.empty()) {
       KILN_DO(insert_artifacts(db, job.id, known, 0));
       KILN_DO(db.run("UPDATE job SET state='succeeded', cached=1, finished_at=? WHERE id=?", now, job.id));
-      KILN_DO(append_success(db, job.id, known, now));
+      KILN_DO(append_end(db, {job.id, JobState::succeeded, "", known}, now));
     }
     KILN_TRY(stored, find_job(db, job.id));
     return Created{*stored, false};
@@ -130,8 +131,7 @@ Result<Job> SqlStore::cancel(const std::string& id) {
                            "state='queued'",
                            now, now, id));
     if (ended > 0) {
-      KILN_DO(append_event(db, {id, EventKind::state, JobState::canceled, ""}, now));
-      KILN_DO(append_event(db, {id, EventKind::done, JobState::canceled, ""}, now));
+      KILN_DO(append_end(db, {id, JobState::canceled}, now));
     } else {
       KILN_TRY(flagged, db.run("UPDATE job SET cancel_requested_at=? WHERE id=? AND state='running' AND "
                                "cancel_requested_at IS NULL",

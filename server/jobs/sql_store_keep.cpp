@@ -11,7 +11,7 @@ tl::unexpected<Fault> unknown_job() { return fault("not_found", "there is no suc
 
 /// Deletes or counts the jobs of a tenant that ended before `before`.
 Result<int> forget_jobs(Connection& db, const std::string& tenant, std::int64_t before, bool only_count) {
-  const std::string which = " FROM job WHERE tenant=? AND finished_at<? AND pinned=0";
+  const std::string which = " FROM job WHERE tenant=? AND finished_at<? AND pinned=0 AND parent IS NULL";
   if (!only_count) return db.run("DELETE" + which, tenant, before);
   KILN_TRY(rows, db.query("SELECT count(*)" + which, tenant, before));
   return static_cast<int>(rows.front().integer(0));
@@ -98,6 +98,7 @@ Result<std::vector<std::string>> SqlStore::forget_unused_blobs(Millis grace, boo
         " FROM blob WHERE last_ref_at<? "
         "AND NOT EXISTS(SELECT 1 FROM job_input i WHERE i.sha256=blob.sha256) "
         "AND NOT EXISTS(SELECT 1 FROM artifact a WHERE a.sha256=blob.sha256) "
+        "AND NOT EXISTS(SELECT 1 FROM job j WHERE j.journal=blob.sha256) "
         "AND NOT EXISTS(SELECT 1 FROM blob_tenant t WHERE t.sha256=blob.sha256 AND t.pinned=1)";
     const std::int64_t before = now - grace.count();
     KILN_TRY(rows, only_count ? db.query("SELECT sha256" + which, before)

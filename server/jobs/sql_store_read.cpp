@@ -28,7 +28,7 @@ Result<Cursor> parse_cursor(const std::string& text) {
 }
 
 Result<Rows> query_page(Connection& db, const JobQuery& query, int limit) {
-  std::string statement = std::string("SELECT ") + kJobColumns + " FROM job WHERE TRUE";
+  std::string statement = std::string("SELECT ") + kJobColumns + " FROM job WHERE parent IS NULL";
   std::vector<Value> values;
   const auto add = [&](const char* condition, const auto& value) {
     statement += condition;
@@ -100,7 +100,7 @@ Result<std::vector<Artifact>> SqlStore::find_result(const std::string& content_k
 Result<StoreCounts> SqlStore::counts() {
   return read([&](Connection& db) -> Result<StoreCounts> {
     StoreCounts counts;
-    KILN_TRY(rows, db.query("SELECT state, count(*), min(created_at) FROM job GROUP BY state"));
+    KILN_TRY(rows, db.query("SELECT state, count(*), min(created_at) FROM job WHERE parent IS NULL GROUP BY state"));
     for (const Row& row : rows) {
       const auto number = static_cast<std::uint64_t>(row.integer(1));
       switch (parse_job_state(row.text(0)).value_or(JobState::queued)) {
@@ -146,7 +146,9 @@ Result<std::vector<JobEvent>> SqlStore::events_after(std::uint64_t after, const 
         "FROM job_event e LEFT JOIN artifact a ON a.job_id=e.job_id AND a.name=e.message AND e.kind='artifact' "
         "WHERE e.id>?";
     std::vector<Value> values{value_of(after)};
-    if (!job_id.empty()) {
+    if (job_id.empty()) {
+      statement += " AND NOT EXISTS(SELECT 1 FROM job part WHERE part.id=e.job_id AND part.parent IS NOT NULL)";
+    } else {
       statement += " AND e.job_id=?";
       values.push_back(value_of(job_id));
     }

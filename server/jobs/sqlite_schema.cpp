@@ -121,6 +121,17 @@ CREATE TABLE upload_day(
 ) STRICT;
 )sql";
 
+// From version 3 to 4: parts of jobs, and how much memory a job may use.
+constexpr const char* kVersion4 = R"sql(
+ALTER TABLE job ADD COLUMN memory_mb INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN parent TEXT REFERENCES job(id) ON DELETE CASCADE;
+ALTER TABLE job ADD COLUMN part_order TEXT;
+ALTER TABLE job ADD COLUMN maker TEXT;
+ALTER TABLE job ADD COLUMN journal TEXT REFERENCES blob(sha256);
+CREATE INDEX job_by_parent ON job(parent, id) WHERE parent IS NOT NULL;
+CREATE INDEX job_by_journal ON job(journal) WHERE journal IS NOT NULL;
+)sql";
+
 // A table that older programs need not know, so it comes without a new version.
 constexpr const char* kDeliveries = R"sql(
 CREATE TABLE IF NOT EXISTS delivery(
@@ -196,14 +207,17 @@ Result<void> refuse_network_files(const std::filesystem::path& file) {
 Result<void> make_tables(SqliteConnection& db) {
   KILN_TRY(transaction, Transaction::begin(db));
   KILN_TRY(version, single_value(db, "PRAGMA user_version"));
-  if (version == "0") KILN_DO(db.execute(kTables));
-  if (version == "0" || version == "1") KILN_DO(db.execute(kVersion2));
-  if (version == "0" || version == "1" || version == "2") {
-    KILN_DO(db.execute(kVersion3));
-    KILN_DO(db.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion)));
-  } else if (version != std::to_string(kSchemaVersion)) {
-    return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +
-                                       ", this one knows " + std::to_string(kSchemaVersion) + ")");
+  const std::string newest = std::to_string(kSchemaVersion);
+  constexpr std::array kSteps{kTables, kVersion2, kVersion3, kVersion4};  // from 0 to 1, from 1 to 2, and on
+  static_assert(kSteps.size() == kSchemaVersion);
+  if (version != newest) {
+    const auto known = version.size() == 1 ? static_cast<std::size_t>(version.front() - '0') : kSteps.size();
+    if (known >= kSteps.size()) {
+      return fault("schema_too_new", "the job store was written by another version of this program (schema " + version +
+                                         ", this one knows " + newest + ")");
+    }
+    for (std::size_t step = known; step < kSteps.size(); ++step) KILN_DO(db.execute(kSteps.at(step)));
+    KILN_DO(db.execute("PRAGMA user_version=" + newest));
   }
   KILN_DO(db.execute(kDeliveries));
   return transaction.commit();

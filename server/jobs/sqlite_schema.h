@@ -7,7 +7,7 @@
 
 namespace kiln::sql {
 
-inline constexpr int kSchemaVersion = 3;
+inline constexpr int kSchemaVersion = 4;
 using Clock = std::function<std::int64_t()>;
 
 /// The one connection that writes: settings verified, file checked, tables there.

@@ -45,6 +45,11 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
       ->check(CLI::Range(0, 256));
   add(app, "--threads", options.service.threads, "threads of one worker; 0 shares the machine among the workers")
       ->check(CLI::Range(0, 1024));
+  add(app, "--memory-mb", options.service.memory_mb,
+      "memory that the limits of running jobs may add up to; 0: what the machine has");
+  add(app, "--share-s", options.service.sharing.least_s,
+      "other workers may compute ranges of a bake that take at least so long; 0: none are given away")
+      ->check(CLI::Range(0.0, 3600.0));
   add(app, "--token-file", options.token_file, "file of bearer tokens, one a line; without it nobody is asked");
   add(app, "--cors-origin", options.cors_origins,
       "https://host[:port] whose pages may use this server from a browser; more with commas")
@@ -72,6 +77,7 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   app.add_flag("--webhook-private", options.service.webhooks.private_too,
                "receivers may be in this machine's own network, and http://")
       ->envname("KILN_WEBHOOK_PRIVATE");
+  add(app, "--share-repeats", options.service.sharing.repeats, "for tests: see Sharing")->group("");
   add(app, "--worker-command", raw.worker_command, "another program as worker, for tests")->group("");
   app.add_flag("--require-sandbox", options.service.require_sandbox,
                "refuse to start where workers cannot be locked in")

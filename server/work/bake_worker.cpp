@@ -1,21 +1,26 @@
 #include "server/work/bake_worker.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <new>
+#include <optional>
+#include <system_error>
 #include <thread>
 
 #include "core/bake/bake.h"
 #include "core/base/threads.h"
 #include "server/work/sandbox.h"
+#include "server/work/shared_bake.h"
 #include "server/work/worker_protocol.h"
 
 namespace kiln {
@@ -136,6 +141,41 @@ Progress progress_to_pipe() {
   };
 }
 
+/// What the supervisor says, a line at a time, on descriptor 0.
+class Answers {
+ public:
+  explicit Answers(const Threads& threads) : threads_(threads) {}
+
+  std::string line() {
+    for (std::size_t end = 0; (end = text_.find('\n')) == std::string::npos;) {
+      threads_.check();
+      pollfd what{STDIN_FILENO, POLLIN, 0};
+      if (::poll(&what, 1, kLookEveryMs) <= 0) continue;
+      std::array<char, 4096> piece{};
+      const ssize_t got = ::read(STDIN_FILENO, piece.data(), piece.size());
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) throw WorkerTrouble{{"internal", "the supervisor is gone", ""}};
+      text_.append(piece.data(), static_cast<std::size_t>(got));
+    }
+    const std::size_t end = text_.find('\n');
+    std::string first = text_.substr(0, end);
+    text_.erase(0, end + 1);
+    return first;
+  }
+
+ private:
+  static constexpr int kLookEveryMs = 200;
+  const Threads& threads_;
+  std::string text_;
+};
+
+RangeReply ask_next(std::uint64_t loop, Answers& answers) {
+  tell(WorkerNext{loop});
+  auto reply = parse_reply(answers.line());
+  if (!reply) throw WorkerTrouble{reply.error()};
+  return *reply;
+}
+
 int refuse(const Fault& fault) {
   tell(fault);
   return kExitRefused;
@@ -149,14 +189,37 @@ int make_plan(const BakeInput& input, Threads& threads) {
   return kExitDone;
 }
 
-int make_bake(const BakeInput& input, const std::string& checkpoint, Threads& threads) {
-  const auto output = bake(input, progress_to_pipe(), threads,
-                           {checkpoint, [](const std::string& text) { tell(WorkerCheckpoint{text}); }});
+Result<BakeOutput> bake_order(const BakeInput& input, const WorkerOrder& order, Threads& threads) {
+  return bake(input, progress_to_pipe(), threads,
+              {order.checkpoint, [](const std::string& text) { tell(WorkerCheckpoint{text}); }});
+}
+
+int make_bake(const BakeInput& input, const WorkerOrder& order, Threads& threads) {
+  Answers answers(threads);
+  std::optional<GivingLoops> loops;
+  if (order.sharing.least_s > 0) {
+    const SupervisorLink link{tell, [&](std::uint64_t loop) { return ask_next(loop, answers); }};
+    threads.share_with(&loops.emplace(order.sharing, order.known, "out", link));
+  }
+  const auto output = bake_order(input, order, threads);
   if (!output) return refuse(output.error());
   for (const ArtifactFile& file : output->files) {
     write_file("out/" + file.name, file.bytes.data(), file.bytes.size());
     tell(WorkerArtifact{file.name, file.media_type});
   }
+  tell(WorkerDone{});
+  return kExitDone;
+}
+
+int make_part(const BakeInput& input, const WorkerOrder& order, Threads& threads) try {
+  if (!order.range) throw WorkerTrouble{{"internal", "the worker was given no range", ""}};
+  TakingLoops loops(*order.range, map_file("inputs/journal"), "out/range");
+  threads.share_with(&loops);
+  const auto output = bake_order(input, order, threads);
+  if (!output) return refuse(output.error());
+  return refuse({"no_such_range", "the bake has no loop of this number", ""});
+} catch (const RangeDone&) {
+  tell(WorkerArtifact{"range", "application/octet-stream"});
   tell(WorkerDone{});
   return kExitDone;
 }
@@ -176,7 +239,15 @@ int run_order(const Sandbox& sandbox) {
   Threads threads(order.threads);
   const TermWatch watch(threads);
   const BakeInput input = read_input(order);
-  return order.mode == WorkerMode::plan ? make_plan(input, threads) : make_bake(input, order.checkpoint, threads);
+  switch (order.mode) {
+    case WorkerMode::plan:
+      return make_plan(input, threads);
+    case WorkerMode::part:
+      return make_part(input, order, threads);
+    case WorkerMode::bake:
+      break;
+  }
+  return make_bake(input, order, threads);
 }
 
 int failed(const Fault& fault) try {
@@ -197,6 +268,10 @@ int bake_worker_main(int argc, char** argv) try {
   return kExitCanceled;
 } catch (const WorkerTrouble& trouble) {
   return failed(trouble.fault);
+} catch (const std::system_error& error) {
+  const bool full = error.code() == std::errc::no_space_on_device;
+  return failed(
+      {full ? "disk_full" : "internal", full ? "the disk of the server is full" : "the worker could not write", ""});
 } catch (const std::bad_alloc&) {
   return failed({"out_of_memory", "the job needed more memory than its limit allows", "/limits/memory_mb"});
 } catch (const std::exception& error) {

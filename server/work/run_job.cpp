@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <fstream>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <sstream>
 #include <thread>
@@ -14,6 +15,7 @@
 #include "core/bake/recipe.h"
 #include "server/jobs/ids.h"
 #include "server/work/checkpoint_file.h"
+#include "server/work/part_desk.h"
 #include "server/work/work_folder.h"
 #include "server/work/worker_protocol.h"
 
@@ -133,7 +135,8 @@ class JobRun {
       : claim_(claim), stop_(stop), place_(place), checkpoint_(place.options.checkpoints, claim.ref.job_id) {}
 
   void run() {
-    const auto known = claim_.job.force ? std::vector<Artifact>{} : known_result();
+    const bool afresh = claim_.job.force || claim_.job.part;
+    const auto known = afresh ? std::vector<Artifact>{} : known_result();
     if (!known.empty()) {
       succeed(known, true);
     } else {
@@ -155,18 +158,44 @@ class JobRun {
     Pulse pulse(claim_, stop_, place_);
     const auto path = place_.options.folder / (claim_.ref.job_id + "." + claim_.ref.token);
     WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
+    if (claim_.job.part) return conclude_part(std::move(order), path, *limits, pulse);
     order.checkpoint = checkpoint_.load();
+    order.sharing = place_.options.sharing;
+    std::optional<PartDesk> desk;
+    if (order.sharing.least_s > 0) order.known = desk.emplace(claim_, place_, path, order.checkpoint).known();
     const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
-    end_as(bake(*folder, *limits, pulse), *folder);
+    const WorkerOutcome outcome = bake(*folder, *limits, pulse, desk ? &*desk : nullptr);
+    desk.reset();
+    end_as(outcome, *folder);
   }
 
-  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits, Pulse& pulse) {
+  void conclude_part(WorkerOrder order, const std::filesystem::path& path, const Limits& limits, Pulse& pulse) {
+    const auto part = parse_part(claim_.job.part->order);
+    if (!part) return fail({part.error(), 500});
+    order.mode = WorkerMode::part;
+    order.range = part->range;
+    order.checkpoint = part->checkpoint;
+    order.journal = claim_.job.part->journal;
+    const auto folder = WorkFolder::make(path, place_.blobs, order);
+    if (!folder) return after_trouble(folder.error());
+    end_as(bake(*folder, limits, pulse, nullptr), *folder);
+  }
+
+  WorkerOutcome bake(const WorkFolder& folder, const Limits& limits, Pulse& pulse, PartDesk* desk) {
     const std::uint64_t memory = limits.memory_mb << 20;
-    return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder)},
-                      {memory, limits.wall_s}, stop_,
-                      {[&](const ProgressEvent& event) { pulse.progress(event); },
-                       [&](const std::string& text) { checkpoint_.save(text); }});
+    WorkerNews news{[&](const ProgressEvent& event) { pulse.progress(event); }, {}, {}};
+    if (!claim_.job.part) news.checkpoint = [&](const std::string& text) { checkpoint_.save(text); };
+    if (desk != nullptr) {
+      news.parts = [desk](const WorkerLine& line) { desk->hear(line); };
+      news.checkpoint = [this, desk](const std::string& text) {
+        checkpoint_.save(text);
+        desk->pass_ended(text);
+      };
+    }
+    return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder),
+                       desk != nullptr ? desk->worker_end() : -1},
+                      {memory, limits.wall_s}, stop_, news);
   }
 
   void end_as(const WorkerOutcome& outcome, const WorkFolder& folder) {
@@ -215,6 +244,10 @@ class JobRun {
     if (!wrote(
             persist(stop_, place_.options.lease, [&] { return place_.store.commit(claim_.ref, artifacts, cached); })))
       return;
+    if (claim_.job.part) {
+      ++place_.counters.parts;
+      return;
+    }
     checkpoint_.remove();
     ++place_.counters.succeeded;
     if (cached) ++place_.counters.cached;
@@ -222,6 +255,7 @@ class JobRun {
 
   void fail(const JobError& error) {
     if (!wrote(persist(stop_, place_.options.lease, [&] { return place_.store.fail(claim_.ref, error); }))) return;
+    if (claim_.job.part) return;  // whose part it is computes it itself
     checkpoint_.remove();
     ++place_.counters.failed;
   }
@@ -268,7 +302,7 @@ class JobRun {
   void finish_cancel() {
     const auto ended = persist(stop_, place_.options.lease, [&] { return place_.store.finish_cancel(claim_.ref); });
     if (!ended) return;
-    checkpoint_.remove();
+    if (!claim_.job.part) checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);
   }
 

@@ -17,6 +17,7 @@ namespace kiln {
 struct WorkCounters {
   std::atomic<std::uint64_t> claimed{0}, succeeded{0}, failed{0}, canceled{0}, cached{0};
   std::atomic<std::uint64_t> retried{0}, reaped{0}, forgotten{0}, lost_leases{0}, stale_commits{0};
+  std::atomic<std::uint64_t> parts{0};  // ranges computed for others' bakes
   std::atomic<std::uint64_t> deaths_signal{0}, deaths_memory{0}, deaths_timeout{0};
   std::atomic<std::uint64_t> bytes_uploaded{0};
   Durations claim_latency;
@@ -30,6 +31,7 @@ struct WorkOptions {
   Millis first_retry{10'000};
   Millis lease{60'000};  // how long the store waits for a word of a running job's server
   bool require_sandbox = false;
+  Sharing sharing;
 };
 
 /// What all of the work shares.

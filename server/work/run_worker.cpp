@@ -66,8 +66,12 @@ class Watch {
       if (!ended_by_us() && news_.checkpoint) news_.checkpoint(checkpoint->text);
     } else if (const auto* fault = std::get_if<Fault>(&*line)) {
       told_ = *fault;
-    } else {
+    } else if (std::holds_alternative<WorkerDone>(*line)) {
       said_done_ = true;
+    } else if (news_.parts) {
+      if (!ended_by_us()) news_.parts(*line);
+    } else {
+      end(Kind::internal, {"internal", "the worker offered work to others", ""}, SIGKILL);
     }
   }
 

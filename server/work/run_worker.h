@@ -53,6 +53,7 @@ struct WorkerOutcome {
 struct WorkerNews {
   std::function<void(const ProgressEvent&)> progress;
   std::function<void(const std::string&)> checkpoint;
+  std::function<void(const WorkerLine&)> parts;  // share, next, made; empty: the worker has no business to say so
 };
 
 /// Blocks until the process is gone. Never throws, whatever the worker does.

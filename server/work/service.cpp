@@ -1,5 +1,7 @@
 #include "server/work/service.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
 #include <thread>
@@ -52,6 +54,13 @@ std::vector<NamedBlob> all_files(const JobInputs& inputs) {
 
 std::string hash_of(const std::string& text) {
   return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+std::uint64_t memory_mb(const ServiceOptions& options) {
+  if (options.memory_mb > 0) return options.memory_mb;
+  const auto bytes =
+      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  return bytes >> 20;
 }
 
 /// Everything a request says, so that an idempotency key means one request.
@@ -157,7 +166,7 @@ class LocalService final : public Service {
   const WorkOptions work_options_ = work_options();
   StopSignal plans_stop_;
   std::atomic<int> plans_{0};
-  Supervisor supervisor_{place(), options_.workers, [this] { return may_claim(); }};
+  Supervisor supervisor_{place(), {options_.workers, memory_mb(options_)}, [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), {options_.blob_grace, options_.retention}};
   Neighbours neighbours_{place(), supervisor_};
   UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};
@@ -184,8 +193,15 @@ class LocalUpload final : public AssetUpload {
 WorkOptions LocalService::work_options() const {
   const int hardware = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = options_.threads > 0 ? options_.threads : std::max(1, hardware / std::max(1, options_.workers));
-  return {options_.data / "work", options_.data / "checkpoints", options_.worker_command, threads, options_.first_retry,
-          options_.lease,         options_.require_sandbox};
+  const bool others = options_.workers > 1 || store_->shared();
+  return {.folder = options_.data / "work",
+          .checkpoints = options_.data / "checkpoints",
+          .worker_command = options_.worker_command,
+          .threads = threads,
+          .first_retry = options_.first_retry,
+          .lease = options_.lease,
+          .require_sandbox = options_.require_sandbox,
+          .sharing = others ? options_.sharing : Sharing{}};
 }
 
 void LocalService::drain() {
@@ -210,6 +226,7 @@ Result<Created> LocalService::submit(const Submission& submission) {
   job.inputs = std::move(inputs);
   job.force = submission.force;
   job.idempotency_key = submission.idempotency_key;
+  job.memory_mb = submission.recipe.limits.memory_mb;
   job.max_queued = options_.max_queued;
   job.request_hash = request_hash(job);
   if (!submission.tenant) share_with_nobody(job.inputs);
@@ -372,6 +389,7 @@ ServiceStats LocalService::stats() {
   stats.failed = counters_.failed;
   stats.canceled = counters_.canceled;
   stats.cached = counters_.cached;
+  stats.parts = counters_.parts;
   stats.retried = counters_.retried;
   stats.reaped = counters_.reaped;
   stats.forgotten = counters_.forgotten;

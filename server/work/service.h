@@ -25,6 +25,7 @@
 #include "server/work/sandbox.h"
 #include "server/work/stores.h"
 #include "server/work/upload_desk.h"
+#include "server/work/worker_protocol.h"
 
 namespace kiln {
 
@@ -33,6 +34,8 @@ struct ServiceOptions {
   StoreOptions stores;                      // where jobs and blobs live when not in `data`
   int workers = 1;                          // jobs at a time, each in a process of its own; 0: bake nothing
   int threads = 0;                          // of one worker when its recipe does not say; 0: hardware threads / workers
+  std::uint64_t memory_mb = 0;              // that running jobs may declare together; 0: what the machine has
+  Sharing sharing{.least_s = 10};           // of bakes, where there are other workers
   std::vector<std::string> worker_command;  // empty: this very program with "bake-worker"
   int max_queued = 1000;
   double soft_free_fraction = 0.10;  // below: uploads are refused with disk_full
@@ -92,6 +95,7 @@ class EventStream {
 struct ServiceStats {
   StoreCounts jobs;
   std::uint64_t claimed = 0, succeeded = 0, failed = 0, canceled = 0, cached = 0;  // since start
+  std::uint64_t parts = 0;  // ranges computed for bakes, here or of other servers
   std::uint64_t retried = 0, reaped = 0, forgotten = 0, lost_leases = 0, stale_commits = 0;
   std::uint64_t deaths_signal = 0, deaths_memory = 0, deaths_timeout = 0;
   std::uint64_t bytes_uploaded = 0;

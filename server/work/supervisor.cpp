@@ -9,13 +9,13 @@ constexpr Millis kLongestRest{2000};  // wake() is the fast way; this is the tru
 
 }  // namespace
 
-Supervisor::Supervisor(WorkPlace place, int workers, std::function<bool()> may_claim)
-    : place_(place), workers_(workers), may_claim_(std::move(may_claim)) {}
+Supervisor::Supervisor(WorkPlace place, const Means& means, std::function<bool()> may_claim)
+    : place_(place), means_(means), may_claim_(std::move(may_claim)) {}
 
 Supervisor::~Supervisor() { stop(); }
 
 void Supervisor::start() {
-  for (int i = 0; i < workers_; ++i) threads_.emplace_back([this] { work(); });
+  for (int i = 0; i < means_.workers; ++i) threads_.emplace_back([this] { work(); });
 }
 
 void Supervisor::stop() {
@@ -66,14 +66,30 @@ void Supervisor::work() {
       if (stopping_) return;
       seen = wakes_;
     }
-    const auto claim =
-        may_claim_() ? place_.store.claim(place_.options.lease) : Result<std::optional<Claim>>(std::nullopt);
-    if (claim && *claim) {
-      run(**claim);
+    const auto next = claim();
+    if (next && *next) {
+      run(**next);
     } else {
       rest(seen);
     }
   }
+}
+
+Result<std::optional<Claim>> Supervisor::claim() {
+  if (!may_claim_()) return std::nullopt;
+  const std::lock_guard one_at_a_time(claiming_);
+  Taker taker{.maker = maker_};
+  {
+    const std::lock_guard lock(mutex_);
+    taker.idle = taken_ == 0;
+    taker.free_mb = means_.memory_mb - std::min(means_.memory_mb, taken_mb_);
+  }
+  auto next = place_.store.claim(place_.options.lease, taker);
+  if (!next || !*next) return next;
+  const std::lock_guard lock(mutex_);
+  ++taken_;
+  taken_mb_ += (*next)->job.memory_mb;
+  return next;
 }
 
 void Supervisor::run(const Claim& claim) {
@@ -86,8 +102,10 @@ void Supervisor::run(const Claim& claim) {
   // Asked for between the claim and the entry above: nobody could tell this worker.
   const auto job = place_.store.get(claim.ref.job_id);
   if (job && job->cancel_requested) signal->ask(StopReason::cancel);
-  ++place_.counters.claimed;
-  place_.counters.claim_latency.add(static_cast<double>(claim.job.started_ms - claim.job.created_ms) / 1000);
+  if (!claim.job.part) {
+    ++place_.counters.claimed;
+    place_.counters.claim_latency.add(static_cast<double>(claim.job.started_ms - claim.job.created_ms) / 1000);
+  }
   place_.bus.announce();
   try {
     run_job(claim, *signal, place_);
@@ -98,6 +116,9 @@ void Supervisor::run(const Claim& claim) {
   }
   const std::lock_guard lock(mutex_);
   running_.erase(claim.ref.job_id);
+  --taken_;
+  taken_mb_ -= claim.job.memory_mb;
+  changed_.notify_all();
 }
 
 void Supervisor::rest(std::uint64_t seen) {

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/work/maker.h"
 #include "server/work/run_job.h"
 
 namespace kiln {
@@ -17,8 +18,12 @@ namespace kiln {
 /// One thread for each worker: it claims, starts a process, watches it, writes the end. Idle threads wait for wake().
 class Supervisor {
  public:
+  struct Means {
+    int workers = 1;
+    std::uint64_t memory_mb = 0;  // for all of them
+  };
   /// `may_claim` is asked before each claim: false while the disk is nearly full.
-  Supervisor(WorkPlace place, int workers, std::function<bool()> may_claim);
+  Supervisor(WorkPlace place, const Means&, std::function<bool()> may_claim);
   ~Supervisor();
 
   void start();
@@ -35,17 +40,22 @@ class Supervisor {
 
  private:
   void work();
+  Result<std::optional<Claim>> claim();
   void run(const Claim&);
   void rest(std::uint64_t seen);  // until wake() was called after `seen` wakes, a job is due, or two seconds passed
 
   WorkPlace place_;
-  int workers_;
+  Means means_;
+  const std::string maker_ = maker_word();
   std::function<bool()> may_claim_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::uint64_t wakes_ = 0;
   bool stopping_ = false;
   std::map<std::string, std::shared_ptr<StopSignal>> running_;  // by job id
+  std::mutex claiming_;                                         // one at a time, since each takes memory from the next
+  std::uint64_t taken_mb_ = 0;                                  // by running jobs
+  int taken_ = 0;                                               // how many they are
   std::vector<std::thread> threads_;
 };
 

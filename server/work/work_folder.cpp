@@ -38,6 +38,10 @@ Result<WorkFolder> WorkFolder::make(const fs::path& path, const BlobStore& blobs
     auto placed = place_input(blobs, files[place], path / input_path(place));
     if (!placed) return tl::make_unexpected(placed.error());
   }
+  if (!order.journal.empty()) {
+    auto placed = place_input(blobs, {"journal", order.journal}, path / "inputs" / "journal");
+    if (!placed) return tl::make_unexpected(placed.error());
+  }
   std::ofstream out(path / "job.json", std::ios::binary);
   out << order_json(order);
   out.close();

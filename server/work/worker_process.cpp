@@ -51,7 +51,11 @@ struct SpawnSettings {
 void set_files(SpawnSettings& settings, const WorkerStart& start, int pipe) {
   auto* files = &settings.files;
   const std::string log = start.folder / "worker.log";
-  posix_spawn_file_actions_addopen(files, 0, "/dev/null", O_RDONLY, 0);
+  if (start.input >= 0) {
+    posix_spawn_file_actions_adddup2(files, start.input, 0);
+  } else {
+    posix_spawn_file_actions_addopen(files, 0, "/dev/null", O_RDONLY, 0);
+  }
   posix_spawn_file_actions_addopen(files, 2, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   posix_spawn_file_actions_adddup2(files, 2, 1);
   posix_spawn_file_actions_adddup2(files, pipe, kWorkerPipe);

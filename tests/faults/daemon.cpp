@@ -141,20 +141,28 @@ Answer http_put(int port, const std::string& path, const std::string& bytes) {
   return answer_of(client(port).Put(path, bytes, "application/octet-stream"));
 }
 
-std::string cube_glb() {
-  const std::array<float, 24> corners{-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1,
-                                      -1, -1, 1,  1, -1, 1,  1, 1, 1,  -1, 1, 1};
-  const std::array<std::uint16_t, 36> faces{0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
-                                            3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
-  std::string bytes(sizeof corners + sizeof faces, '\0');
-  std::memcpy(bytes.data(), corners.data(), sizeof corners);
-  std::memcpy(bytes.data() + sizeof corners, faces.data(), sizeof faces);
-  std::string json = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-                     R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
-                     R"("buffers":[{"byteLength":168}],"bufferViews":[{"buffer":0,"byteLength":96},)"
-                     R"({"buffer":0,"byteOffset":96,"byteLength":72}],"accessors":[)"
-                     R"({"bufferView":0,"componentType":5126,"count":8,"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]},)"
-                     R"({"bufferView":1,"componentType":5123,"count":36,"type":"SCALAR"}]})";
+namespace {
+
+struct Triangles {
+  std::vector<float> position;
+  std::vector<std::uint16_t> corner;
+};
+
+std::string glb_of(const Triangles& mesh) {
+  const std::size_t places = mesh.position.size() * sizeof(float), corners = mesh.corner.size() * sizeof(std::uint16_t);
+  std::string bytes((places + corners + 3) / 4 * 4, '\0');
+  std::memcpy(bytes.data(), mesh.position.data(), places);
+  std::memcpy(bytes.data() + places, mesh.corner.data(), corners);
+  const auto text_of = [](std::size_t number) { return std::to_string(number); };
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{"byteLength":)" +
+      text_of(bytes.size()) + R"(}],"bufferViews":[{"buffer":0,"byteLength":)" + text_of(places) +
+      R"(},{"buffer":0,"byteOffset":)" + text_of(places) + R"(,"byteLength":)" + text_of(corners) +
+      R"(}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","min":[-1,-1,-1],)"
+      R"("max":[1,1,1],"count":)" +
+      text_of(mesh.position.size() / 3) + R"(},{"bufferView":1,"componentType":5123,"type":"SCALAR","count":)" +
+      text_of(mesh.corner.size()) + "}]}";
   json.resize((json.size() + 3) / 4 * 4, ' ');
   std::string glb;
   const auto word = [&](std::size_t value) {
@@ -170,6 +178,40 @@ std::string cube_glb() {
   word(bytes.size());
   word(0x004E4942);
   return glb + bytes;
+}
+
+}  // namespace
+
+std::string cube_glb() {
+  return glb_of(
+      {{-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1, -1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1},
+       {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5}});
+}
+
+std::string pit_glb(int squares) {
+  Triangles pit;
+  const auto wall = [&](const std::array<float, 3>& middle, const std::array<float, 3>& right,
+                        const std::array<float, 3>& up) {
+    const std::size_t first = pit.position.size() / 3, row = static_cast<std::size_t>(squares) + 1;
+    for (int j = 0; j <= squares; ++j) {
+      for (int i = 0; i <= squares; ++i) {
+        const float u = 2 * static_cast<float>(i) / static_cast<float>(squares) - 1,
+                    v = 2 * static_cast<float>(j) / static_cast<float>(squares) - 1;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          pit.position.push_back(middle[axis] + u * right[axis] + v * up[axis]);
+        const std::size_t a = first + static_cast<std::size_t>(j) * row + static_cast<std::size_t>(i);
+        if (i == squares || j == squares) continue;
+        for (const std::size_t k : {a, a + 1, a + row + 1, a, a + row + 1, a + row})
+          pit.corner.push_back(static_cast<std::uint16_t>(k));
+      }
+    }
+  };
+  wall({0, -1, 0}, {0, 0, 1}, {1, 0, 0});
+  wall({-1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+  wall({1, 0, 0}, {0, 0, 1}, {0, 1, 0});
+  wall({0, 0, -1}, {1, 0, 0}, {0, 1, 0});
+  wall({0, 0, 1}, {0, 1, 0}, {1, 0, 0});
+  return glb_of(pit);
 }
 
 std::string cube_job(const std::string& scene_sha256, int seed) {

@@ -46,6 +46,10 @@ Answer http_put(int port, const std::string& path, const std::string& bytes);
 /// A triangle-cube GLB: 12 triangles, no normals, so that the smallest true bake has all its stages.
 std::string cube_glb();
 
+/// A cube without its top, seen from within: light comes in and goes from side to side. Each side is so many squares
+/// wide and high.
+std::string pit_glb(int squares);
+
 /// A job document for the cube: as small as a bake gets. `seed` makes its result its own.
 std::string cube_job(const std::string& scene_sha256, int seed);
 

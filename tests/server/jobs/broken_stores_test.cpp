@@ -26,6 +26,8 @@ enum class Flaw {
   deaf_cancels,      // a running job is not told that it was canceled
   loose_pins,        // what is pinned goes all the same
   free_uploads,      // nobody counts what comes
+  greedy_claims,     // nobody looks how much memory is left
+  lasting_parts,     // parts are never forgotten
   hasty_deliveries   // one that somebody works on is given to others as well
 };
 
@@ -57,9 +59,11 @@ class BrokenStore final : public JobStore {
     if (flaw_ == Flaw::forgotten_keys) asked.idempotency_key.clear();
     return store_->create(asked);
   }
-  Result<std::optional<Claim>> claim(Millis lease) override {
+  Result<std::optional<Claim>> claim(Millis lease, const Taker& taker) override {
     if (flaw_ == Flaw::two_owners && last_) return std::exchange(last_, std::nullopt);
-    auto claim = store_->claim(lease);
+    Taker asked = taker;
+    asked.idle = asked.idle || flaw_ == Flaw::greedy_claims;
+    auto claim = store_->claim(lease, asked);
     if (claim) last_ = *claim;
     return claim;
   }
@@ -75,6 +79,16 @@ class BrokenStore final : public JobStore {
   Result<Wrote> retry(const ClaimRef& ref, const Retry& retry) override { return store_->retry(ref, retry); }
   Result<Wrote> release(const ClaimRef& ref) override { return store_->release(ref); }
   Result<Wrote> finish_cancel(const ClaimRef& ref) override { return store_->finish_cancel(ref); }
+  Result<Wrote> add_parts(const ClaimRef& parent, const NewParts& parts) override {
+    return store_->add_parts(parent, parts);
+  }
+  Result<std::vector<PartState>> parts(const std::string& parent) override { return store_->parts(parent); }
+  Result<void> forget_parts(const std::string& parent) override {
+    return flaw_ == Flaw::lasting_parts ? Result<void>{} : store_->forget_parts(parent);
+  }
+  Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) override {
+    return store_->claim_part(id, lease);
+  }
   Result<int> reap(bool everything) override { return flaw_ == Flaw::endless_leases ? 0 : store_->reap(everything); }
   Result<Job> cancel(const std::string& id) override {
     return flaw_ == Flaw::deaf_cancels ? store_->get(id) : store_->cancel(id);
@@ -157,6 +171,8 @@ std::vector<Engine> engines() {
           broken("deaf_cancels", Flaw::deaf_cancels),
           broken("loose_pins", Flaw::loose_pins),
           broken("free_uploads", Flaw::free_uploads),
+          broken("greedy_claims", Flaw::greedy_claims),
+          broken("lasting_parts", Flaw::lasting_parts),
           broken("hasty_deliveries", Flaw::hasty_deliveries)};
 }
 

@@ -73,7 +73,7 @@ TEST_F(PostgresStoreTest, TheClockIsTheDatabases) {
   const Job job = store_->create(new_job(0)).value().job;
   const auto here = std::chrono::duration_cast<Millis>(std::chrono::system_clock::now().time_since_epoch()).count();
   EXPECT_LT(std::abs(job.created_ms - here), 10'000);
-  const Claim claim = store_->claim(Millis(200)).value().value();
+  const Claim claim = store_->claim(Millis(200), {}).value().value();
   EXPECT_EQ(store_->reap().value(), 0);
   std::this_thread::sleep_for(250ms);
   EXPECT_EQ(store_->reap().value(), 1);
@@ -91,7 +91,7 @@ TEST_F(PostgresStoreTest, ManyProgramsNeverClaimTheSameJob) {
       const auto own = open();
       // One that finds all due rows held by others sees none: it looks again, as a supervisor does.
       for (int idle = 0; idle < 20;) {
-        const auto claim = own->claim(60s).value();
+        const auto claim = own->claim(60s, {}).value();
         if (!claim) {
           ++idle;
           std::this_thread::sleep_for(5ms);
@@ -141,7 +141,7 @@ TEST_F(PostgresStoreTest, AWriteOfOneProgramWakesAnother) {
 
 TEST_F(PostgresStoreTest, ARestartOfTheServerLosesNothingAndNeedsNobody) {
   const std::string id = store_->create(new_job(1)).value().job.id;
-  const Claim claim = store_->claim(60s).value().value();
+  const Claim claim = store_->claim(60s, {}).value().value();
   server().stop();
   const auto failed = store_->get(id);
   ASSERT_FALSE(failed);
@@ -218,7 +218,8 @@ TEST_F(PostgresStoreTest, AServerThatMayForgetIsRefused) {
 TEST_F(PostgresStoreTest, ASchemaOfVersionOneIsBroughtToTheNextWithAllItHolds) {
   const std::string id = store_->create(new_job(1)).value().job.id;
   ASSERT_TRUE(server().run("DROP TABLE kiln.upload_day"));
-  ASSERT_TRUE(server().run("ALTER TABLE kiln.job DROP COLUMN pinned"));
+  for (const char* column : {"pinned", "memory_mb", "parent", "part_order", "maker", "journal"})
+    ASSERT_TRUE(server().run(std::string("ALTER TABLE kiln.job DROP COLUMN ") + column));
   ASSERT_TRUE(server().run("ALTER TABLE kiln.blob_tenant DROP COLUMN pinned"));
   ASSERT_TRUE(server().run("UPDATE kiln.meta SET version=1"));
   const auto store = open_postgres_store({server().address(), {}}).value();

@@ -30,10 +30,10 @@ class SqliteStoreTest : public ::testing::Test {
 
   std::filesystem::path file() const { return folder_ / "kiln.db"; }
   /// Runs a statement on a connection of its own; SQLite's result code.
-  int run(const char* statement) const {
+  int run(const std::string& statement) const {
     sqlite3* db = nullptr;
     sqlite3_open(file().c_str(), &db);
-    const int code = sqlite3_exec(db, statement, nullptr, nullptr, nullptr);
+    const int code = sqlite3_exec(db, statement.c_str(), nullptr, nullptr, nullptr);
     sqlite3_close(db);
     return code;
   }
@@ -61,6 +61,25 @@ TEST_F(SqliteStoreTest, ADatabaseOfANewerProgramIsRefused) {
   EXPECT_EQ(open_sqlite_store({file(), {}}).error().code, "schema_too_new");
 }
 
+/// Takes away what version 4 brought.
+const std::string kToVersionThree =
+    "DROP INDEX job_by_parent; DROP INDEX job_by_journal; ALTER TABLE job DROP COLUMN memory_mb; ALTER TABLE job DROP "
+    "COLUMN parent; ALTER TABLE job DROP COLUMN part_order; ALTER TABLE job DROP COLUMN maker; ALTER TABLE job DROP "
+    "COLUMN journal; PRAGMA user_version=3;";
+
+TEST_F(SqliteStoreTest, ADatabaseOfVersionThreeIsBroughtToTheNextWithAllItHolds) {
+  std::string id;
+  {
+    const auto store = open_sqlite_store({file(), {}}).value();
+    id = finished_job(*store).id;
+  }
+  ASSERT_EQ(run(kToVersionThree), SQLITE_OK);
+  const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_EQ(store->get(id)->state, JobState::canceled);
+  EXPECT_FALSE(store->get(id)->part);
+  EXPECT_TRUE(store->parts(id).value().empty());
+}
+
 TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
   std::string id;
   {
@@ -68,7 +87,8 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionOneIsBroughtToTheNextWithAllItHolds) {
     id = finished_job(*store).id;
   }
   // Back to how version 1 was.
-  ASSERT_EQ(run("DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned;"
+  ASSERT_EQ(run(kToVersionThree +
+                "DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned;"
                 "DROP TABLE blob_tenant; DROP TABLE identity; DROP INDEX job_by_tenant; DROP INDEX job_running;"
                 "ALTER TABLE job DROP COLUMN tenant; CREATE INDEX job_running ON job(id) WHERE state='running';"
                 "PRAGMA user_version=1"),
@@ -85,7 +105,8 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionTwoIsBroughtToTheNextWithAllItHolds) {
     const auto store = open_sqlite_store({file(), {}}).value();
     id = finished_job(*store).id;
   }
-  ASSERT_EQ(run("DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned; ALTER TABLE blob_tenant DROP COLUMN pinned;"
+  ASSERT_EQ(run(kToVersionThree +
+                "DROP TABLE upload_day; ALTER TABLE job DROP COLUMN pinned; ALTER TABLE blob_tenant DROP COLUMN pinned;"
                 "PRAGMA user_version=2"),
             SQLITE_OK);
   const auto store = open_sqlite_store({file(), {}}).value();

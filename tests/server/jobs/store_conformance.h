@@ -39,7 +39,7 @@ class StoreConformance : public ::testing::TestWithParam<Engine> {
 
   NewJob job(const std::string& label = "", const std::string& content_key = "");
   Job create(const std::string& label = "") { return store().create(job(label)).value().job; }
-  Claim claim() { return store().claim(kTestLease).value().value(); }
+  Claim claim() { return store().claim(kTestLease, {}).value().value(); }
   Artifact artifact(const std::string& name = "scene.glb") const { return {name, "model/gltf-binary", sha('e'), 12}; }
   static std::string sha(char digit) { return std::string(64, digit); }
   JobState state_of(const std::string& id) { return store().get(id).value().state; }

@@ -17,7 +17,7 @@ TEST_P(StoreClaims, TheOldestDueJobIsClaimedFirstAndOnlyOnce) {
   const std::string second = create().id;
   EXPECT_EQ(claim().ref.job_id, first);
   EXPECT_EQ(claim().ref.job_id, second);
-  EXPECT_FALSE(store().claim(kTestLease).value());
+  EXPECT_FALSE(store().claim(kTestLease, {}).value());
 }
 
 TEST_P(StoreClaims, TokensDifferAndFencesGrow) {
@@ -38,7 +38,7 @@ TEST_P(StoreClaims, ManyThreadsNeverClaimTheSameJob) {
   std::vector<std::thread> threads;
   for (int i = 0; i < 4; ++i) {
     threads.emplace_back([&] {
-      while (auto claim = store().claim(kTestLease).value()) {
+      while (auto claim = store().claim(kTestLease, {}).value()) {
         const std::lock_guard lock(mutex);
         claimed.push_back(claim->ref.job_id);
       }
@@ -203,7 +203,7 @@ TEST_P(StoreClaims, AQueuedJobIsCanceledAtOnceAndTwiceIsFine) {
   const std::string id = create().id;
   EXPECT_EQ(store().cancel(id)->state, JobState::canceled);
   EXPECT_EQ(store().cancel(id)->state, JobState::canceled);
-  EXPECT_FALSE(store().claim(kTestLease).value());
+  EXPECT_FALSE(store().claim(kTestLease, {}).value());
   EXPECT_EQ(store().cancel("01ARZ3NDEKTSV4RRFFQ69G5FAV").error().code, "not_found");
 }
 
@@ -224,7 +224,7 @@ TEST_P(StoreClaims, ReleaseGivesTheAttemptBack) {
 TEST_P(StoreClaims, ARetryWaitsForItsTimeAndCountsItsKind) {
   const std::string id = create().id;
   EXPECT_EQ(store().retry(claim().ref, {"disk full", false, Millis(500)}), Wrote::done);
-  EXPECT_FALSE(store().claim(kTestLease).value());
+  EXPECT_FALSE(store().claim(kTestLease, {}).value());
   EXPECT_EQ(store().next_due().value(), Millis(500));
   clock_.now_ms += 500;
   const Claim again = claim();

@@ -89,7 +89,7 @@ class WebhooksTest : public ::testing::Test {
   }
   std::string failed_job() {
     std::string id = create().id;
-    const Claim claim = store_->claim(Millis(60'000)).value().value();
+    const Claim claim = store_->claim(Millis(60'000), {}).value().value();
     EXPECT_EQ(store_->fail(claim.ref, {{"unknown_format", "It is no glTF.", "a.glb"}, 422}).value(), Wrote::done);
     return id;
   }

@@ -254,6 +254,23 @@ TEST_F(ServiceTest, APlanRunsInAProcessOfItsOwn) {
   EXPECT_EQ(service_->plan(missing).error().code, "asset_not_found");
 }
 
+TEST_F(ServiceTest, JobsWaitForTheMemoryThatTheyDeclare) {
+  options_.workers = 2;
+  options_.memory_mb = 6000;
+  start();
+  Submission big = submission("hang"), other = submission("hang"), small = submission("hang");
+  big.recipe.limits.memory_mb = other.recipe.limits.memory_mb = 4096;
+  small.recipe.limits.memory_mb = 1024;
+  const std::string first = service_->submit(big).value().job.id;
+  wait_running(first);
+  const std::string second = service_->submit(other).value().job.id, third = service_->submit(small).value().job.id;
+  wait_running(third);
+  EXPECT_EQ(service_->get(second)->state, JobState::queued) << "two of 4096 MB do not fit into 6000 MB";
+  service_->cancel(first).value();
+  wait_running(second);
+  for (const std::string& id : {second, third}) service_->cancel(id).value();
+}
+
 TEST_F(ServiceTest, TwoWorkersRunTwoJobsAtATime) {
   options_.workers = 2;
   start();

@@ -17,6 +17,26 @@ TEST(WorkerProtocol, EveryLineComesBackAsItWasSent) {
   const std::string text = R"({"passes":["\u00e4"]})";
   EXPECT_EQ(std::get<WorkerCheckpoint>(parse_line(line_json(WorkerCheckpoint{text})).value()).text, text);
   EXPECT_TRUE(std::holds_alternative<WorkerDone>(parse_line(line_json(WorkerDone{})).value()));
+  const auto share = std::get<WorkerShare>(parse_line(line_json(WorkerShare{3, "rows", 99, {0, 64, 100}})).value());
+  EXPECT_EQ(share.loop, 3U);
+  EXPECT_EQ(share.name, "rows");
+  EXPECT_EQ(share.journal_bytes, 99U);
+  EXPECT_EQ(share.cuts, (std::vector<std::uint64_t>{0, 64, 100}));
+  EXPECT_EQ(std::get<WorkerNext>(parse_line(line_json(WorkerNext{7})).value()).loop, 7U);
+  const auto made = std::get<WorkerMade>(parse_line(line_json(WorkerMade{{1, 2, 3}, "range.1.2"})).value());
+  EXPECT_EQ(made.range, (LoopRange{1, 2, 3}));
+  EXPECT_EQ(made.file, "range.1.2");
+}
+
+TEST(WorkerProtocol, AnswersAndOrdersOfPartsComeBack) {
+  const RangeReply reply = parse_reply(reply_json({{1, 2, 3}, "inputs/range.1.2"})).value();
+  EXPECT_EQ(reply.range, (LoopRange{1, 2, 3}));
+  EXPECT_EQ(reply.file, "inputs/range.1.2");
+  const PartOrder order = parse_part(part_json({{4, 5, 6}, R"({"passes":[]})"})).value();
+  EXPECT_EQ(order.range, (LoopRange{4, 5, 6}));
+  EXPECT_EQ(order.checkpoint, R"({"passes":[]})");
+  EXPECT_FALSE(parse_reply("{}"));
+  EXPECT_FALSE(parse_part(R"({"range":{"loop":1,"first":3,"last":3},"checkpoint":""})")) << "an empty range";
 }
 
 TEST(WorkerProtocol, BytesThatAreNoUtf8StillMakeALine) {
@@ -26,7 +46,10 @@ TEST(WorkerProtocol, BytesThatAreNoUtf8StillMakeALine) {
 TEST(WorkerProtocol, WhatIsNotExactlyALineIsNothing) {
   for (const char* line :
        {"", "{}", "[]", "null", "{", "{\"done\":1}", "{\"progress\":3}", "{\"other\":true}", "{\"checkpoint\":7}",
-        "{\"done\":true,\"fault\":{}}", "{\"progress\":{\"stage\":1}}", "\xff\xfe"}) {
+        "{\"done\":true,\"fault\":{}}", "{\"progress\":{\"stage\":1}}", "\xff\xfe",
+        "{\"share\":{\"loop\":0,\"name\":\"x\",\"journal_bytes\":0,\"cuts\":[0]}}",
+        "{\"share\":{\"loop\":0,\"name\":\"x\",\"journal_bytes\":0,\"cuts\":[0,9,9]}}", "{\"next\":-1.5e99}",
+        "{\"made\":{\"range\":{\"loop\":0,\"first\":2,\"last\":1},\"file\":\"x\"}}"}) {
     EXPECT_FALSE(parse_line(line)) << line;
   }
 }
@@ -47,6 +70,10 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   order.parent = 17;
   order.require_sandbox = true;
   order.checkpoint = R"({"a":1})";
+  order.sharing = {.least_s = 2.5, .repeats = 3};
+  order.known = {{1, 2, 3}, {1, 3, 4}};
+  order.range = LoopRange{5, 6, 7};
+  order.journal = std::string(64, 'd');
   const WorkerOrder back = parse_order(order_json(order)).value();
   EXPECT_EQ(back.inputs.scene, order.inputs.scene);
   EXPECT_EQ(back.inputs.resources, order.inputs.resources);
@@ -57,6 +84,11 @@ TEST(WorkerProtocol, AnOrderComesBackAsItWasSent) {
   EXPECT_EQ(back.parent, 17);
   EXPECT_TRUE(back.require_sandbox);
   EXPECT_EQ(back.checkpoint, order.checkpoint);
+  EXPECT_EQ(back.sharing.least_s, 2.5);
+  EXPECT_EQ(back.sharing.repeats, 3);
+  EXPECT_EQ(back.known, order.known);
+  EXPECT_EQ(back.range, order.range);
+  EXPECT_EQ(back.journal, order.journal);
 }
 
 TEST(WorkerProtocol, ResultNamesCannotLeaveTheirFolder) {
