@@ -23,6 +23,11 @@ double squared_diagonal(const std::vector<Vec3f>& position) {
   return dot(across, across) > 0 ? dot(across, across) : 1;
 }
 
+/// Whether texture coordinates differ on the two sides of an edge.
+bool jumps(const std::vector<Vec2f>& uv, const EdgeSides& s) {
+  return !uv.empty() && s.triangles == 2 && (uv[s.from[0]] != uv[s.from[1]] || uv[s.to[0]] != uv[s.to[1]]);
+}
+
 }  // namespace
 
 CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Collapse how, double mean_square)
@@ -67,7 +72,8 @@ void CollapseCost::update_point(std::uint32_t p) {
       if (mesh_.kind(x) == PointKind::free) continue;
       const Vec3d other = mesh_.position(x);
       const EdgeSides sides = mesh_.sides(p, x);
-      const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam;
+      const bool seam = mesh_.kind(p) == PointKind::seam || mesh_.kind(x) == PointKind::seam ||
+                        jumps(mesh.uv0, sides) || jumps(mesh.uv1, sides);
       if (sides.triangles == 1 || (sides.crease && seam)) q.add_line(other - at, cross(at, other), kBorderWeight);
       if (!sides.crease || sides.triangles != 2 || sides.from[0] == sides.from[1]) continue;
       const Vec3d normal = normalized(to_double(mesh.normal[sides.from[0]]));
@@ -86,16 +92,38 @@ void CollapseCost::update_vertex(std::uint32_t v) {
     for (const std::uint32_t x : {a, b})
       if (std::ranges::find(g.ring, x) == g.ring.end()) g.ring.push_back(x);
   });
-  const std::vector<Vec3f>& normal = mesh_.mesh().normal;
-  products_.of_differences(v, g.ring, normalized(to_double(normal[v])), g.product);
-  const float slope = mesh_.lit().field.sky_slope;  // a mirror that turns shows another part of the sky
-  if (!(slope > 0)) return;
-  for (std::size_t i = 0, at = 0; i < g.ring.size(); ++i)
-    for (std::size_t k = 0; k <= i; ++k, ++at)
-      g.product[at] += slope * dot(normal[g.ring[i]] - normal[v], normal[g.ring[k]] - normal[v]);
+  const Mesh& mesh = mesh_.mesh();
+  products_.of_differences(v, g.ring, normalized(to_double(mesh.normal[v])), g.product);
+  for (float& product : g.product) product = static_cast<float>(light_ * double{product});
+  // A mirror that turns shows another part of the sky.
+  add_products(g, v, mesh.normal, light_ * double{mesh_.lit().field.sky_slope});
+  for (const auto* uv : {&mesh.uv0, &mesh.uv1})
+    if (!uv->empty()) add_products(g, v, *uv, geometry_ * squared_length_of_unit(g.ring, v, *uv));
 }
 
-double CollapseCost::light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const {
+/// Of differences of an attribute.
+template <class Values>
+void CollapseCost::add_products(Gram& g, std::uint32_t v, const Values& values, double weight) {
+  if (!(weight > 0)) return;
+  for (std::size_t i = 0, at = 0; i < g.ring.size(); ++i)
+    for (std::size_t k = 0; k <= i; ++k, ++at)
+      g.product[at] +=
+          static_cast<float>(weight * double{dot(values[g.ring[i]] - values[v], values[g.ring[k]] - values[v])});
+}
+
+/// On the surface around v, of a texture coordinate's unit; 0 where all of them are the same.
+double CollapseCost::squared_length_of_unit(const std::vector<std::uint32_t>& ring, std::uint32_t v,
+                                            const std::vector<Vec2f>& uv) const {
+  const std::vector<Vec3f>& position = mesh_.mesh().position;
+  double surface = 0, texture = 0;
+  for (const std::uint32_t x : ring) {
+    surface += double{dot(position[x] - position[v], position[x] - position[v])};
+    texture += double{dot(uv[x] - uv[v], uv[x] - uv[v])};
+  }
+  return texture > 0 ? surface / texture : 0;
+}
+
+double CollapseCost::vertex_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const {
   const Gram& g = gram_[v];
   const auto index = [&](std::uint32_t x) {
     return static_cast<std::size_t>(std::ranges::find(g.ring, x) - g.ring.begin());
@@ -138,25 +166,21 @@ double CollapseCost::seam_error(std::uint32_t p, std::uint32_t other, const Vec3
 void CollapseCost::find_cost(CollapsePlan& plan) const {
   const Vec3d place = to_double(plan.place), edge = mesh_.position(plan.kept) - mesh_.position(plan.gone);
   const Quadric q = quadric_[plan.gone] + quadric_[plan.kept];
-  double light = 0;
-  if (light_ > 0) {
-    for (std::uint32_t i = 0; i < plan.sides.pairs; ++i) {
-      const std::uint32_t v = plan.sides.from[i], w = plan.sides.to[i];
-      light += light_error(v, w, plan.share, place);
-      if (plan.moves) light += light_error(w, v, 1 - plan.share, place);
-    }
-    mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
-      if (!plan.sides.goes(v)) light += light_error(v, SurfacePoints::kNone, 0, place);
-    });
-    mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
-      if (plan.moves && !plan.sides.takes(w)) light += light_error(w, SurfacePoints::kNone, 0, place);
-    });
+  double change = 0;
+  for (std::uint32_t i = 0; i < plan.sides.pairs; ++i) {
+    const std::uint32_t v = plan.sides.from[i], w = plan.sides.to[i];
+    change += vertex_error(v, w, plan.share, place);
+    if (plan.moves) change += vertex_error(w, v, 1 - plan.share, place);
   }
-  if (light_ > 0) {
-    light += seam_error(plan.gone, plan.kept, place);
-    if (plan.moves) light += seam_error(plan.kept, plan.gone, place);
-  }
-  plan.cost = geometry_ * q.at(place) + light_ * light;
+  mesh_.each_vertex(plan.gone, [&](std::uint32_t v) {
+    if (!plan.sides.goes(v)) change += vertex_error(v, SurfacePoints::kNone, 0, place);
+  });
+  mesh_.each_vertex(plan.kept, [&](std::uint32_t w) {
+    if (plan.moves && !plan.sides.takes(w)) change += vertex_error(w, SurfacePoints::kNone, 0, place);
+  });
+  change += light_ * seam_error(plan.gone, plan.kept, place);
+  if (plan.moves) change += light_ * seam_error(plan.kept, plan.gone, place);
+  plan.cost = geometry_ * q.at(place) + change;
   plan.order = plan.cost + even_ * (area_[plan.gone] + area_[plan.kept]) * dot(edge, edge);
 }
 

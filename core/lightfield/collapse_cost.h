@@ -8,6 +8,8 @@
 // whose matrix holds the products of the differences between p0's neighbours and p0 on p0's hemisphere. That Gram
 // matrix is kept for each vertex; a candidate then costs no integral at all, whatever the degree.
 // Where the field keeps the sky apart, differences of normals times the sky's slope (light_field.h) belong to them.
+// So do differences of texture coordinates, as lengths on the surface: a texture that slides counts as a surface that
+// moves as far, geometry_weight and u included.
 // Both are memoryless: of the mesh as it is now.
 // Paper    Vanhoey et al. 2015, section 4; Hoppe 1999 (memoryless quadrics)
 // Units    cost is a share of a squared relative error; u is kLengthUnit of the diagonal of the mesh's box
@@ -51,7 +53,7 @@ class CollapseCost {
  private:
   struct Gram {
     std::vector<std::uint32_t> ring;  // neighbours of a vertex
-    std::vector<float> product;       // of neighbours i >= k: i (i + 1) / 2 + k
+    std::vector<float> product;       // of neighbours i >= k: i (i + 1) / 2 + k; in units of cost
   };
   /// A seam from a point to the next, and squared distance of the lights on its sides.
   struct Seam {
@@ -61,9 +63,13 @@ class CollapseCost {
   void find_cost(CollapsePlan&) const;
   /// (7a) of p, when it moves to `place` and `other` goes with it.
   double seam_error(std::uint32_t p, std::uint32_t other, const Vec3d& place) const;
-  /// Of the triangles around v, when v at `place` has the light (1 - share) v + share w. w may be kNone: then that of
-  /// v.
-  double light_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
+  template <class Values>
+  static void add_products(Gram&, std::uint32_t v, const Values&, double weight);
+  double squared_length_of_unit(const std::vector<std::uint32_t>& ring, std::uint32_t v,
+                                const std::vector<Vec2f>& uv) const;
+  /// Of the triangles around v, when v at `place` has the attributes (1 - share) v + share w. w may be kNone: then
+  /// those of v.
+  double vertex_error(std::uint32_t v, std::uint32_t w, double share, const Vec3d& place) const;
 
   const CollapseMesh& mesh_;
   FieldProducts products_;

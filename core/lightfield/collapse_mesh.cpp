@@ -27,6 +27,7 @@ CollapseMesh::CollapseMesh(LitMesh& lit, const SurfacePoints& points) : lit_(lit
   gone_.assign(left_, false), mark_.assign(first_vertex_.size(), 0);
   for (std::uint32_t corner = 0; corner < 3 * left_; ++corner)
     append(lit.mesh.triangles[corner / 3][corner % 3], corner);
+  on_border_.assign(this->points(), false), on_outline_.assign(this->points(), false);
   for (std::uint32_t p = 0; p < this->points(); ++p) kind_.push_back(find_kind(p, points.locked[p]));
 }
 
@@ -51,13 +52,18 @@ void CollapseMesh::drop_gone(std::uint32_t v) {
 }
 
 PointKind CollapseMesh::find_kind(std::uint32_t p, bool locked) {
-  if (locked || crowded(p)) return PointKind::locked;
+  if (crowded(p)) return PointKind::locked;
   std::uint32_t borders = 0, seams = 0, vertices = 0;
   for (const std::uint32_t q : ring(p)) {
     const EdgeSides s = sides(p, q);
-    if (s.triangles > 2) return PointKind::locked;
-    if (s.crease) ++(s.triangles == 1 ? borders : seams);
+    if (s.triangles > 2) locked = true;
+    if (!s.crease || s.triangles > 2) continue;
+    const bool border = s.triangles == 1;
+    ++(border ? borders : seams);
+    if (border) on_border_[p] = on_border_[q] = true;
+    if (s.outline) on_outline_[p] = on_outline_[q] = true;
   }
+  if (locked) return PointKind::locked;
   each_vertex(p, [&](std::uint32_t) { ++vertices; });
   if (borders == 0 && seams == 0 && vertices == 1) return PointKind::free;
   if (borders == 2 && seams == 0 && vertices == 1) return PointKind::border;
@@ -95,11 +101,11 @@ EdgeSides CollapseMesh::sides(std::uint32_t p, std::uint32_t q) const {
   });
   s.pairs = std::min(s.triangles, 2U);
   if (s.triangles == 2) {
-    const auto part = [&](std::size_t i) { return lit_.mesh.part.empty() ? 0 : lit_.mesh.part[s.triangle[i]]; };
     if (s.from[0] == s.from[1] && s.to[0] == s.to[1]) s.pairs = 1;
-    s.crease = s.pairs == 2 || part(0) != part(1);
+    s.outline = part_of(s.triangle[0]) != part_of(s.triangle[1]);
+    s.crease = s.pairs == 2 || s.outline;
   } else {
-    s.crease = true;
+    s.crease = s.outline = true;
   }
   return s;
 }
@@ -107,10 +113,9 @@ EdgeSides CollapseMesh::sides(std::uint32_t p, std::uint32_t q) const {
 CollapseMesh::Allowed CollapseMesh::allowed(std::uint32_t gone, std::uint32_t kept, const EdgeSides& s) const {
   if (s.triangles == 0 || s.triangles > 2 || kind_[gone] == PointKind::locked) return {};
   if (kind_[gone] == PointKind::free) return {.at_kept = true, .elsewhere = kind_[kept] == PointKind::free};
-  // Along a crease of its own, each vertex onto one.
-  const bool split = s.pairs == 2 && s.from[0] == s.from[1];
-  if (!s.crease || split) return {};
-  return {.at_kept = true, .elsewhere = kind_[kept] == kind_[gone] && !(s.pairs == 2 && s.to[0] == s.to[1])};
+  const bool split = s.pairs == 2 && s.from[0] == s.from[1], onto_one = s.pairs == 2 && s.to[0] == s.to[1];
+  if (split || (on_border_[gone] && s.triangles == 2) || (on_outline_[gone] && !s.outline)) return {};
+  return {.at_kept = true, .elsewhere = s.crease && kind_[kept] == kind_[gone] && !onto_one};
 }
 
 bool CollapseMesh::next_to(std::uint32_t p, std::uint32_t q) const {
@@ -178,7 +183,10 @@ void CollapseMesh::carry_rest(std::uint32_t gone, std::uint32_t kept, const Edge
     last = next_vertex_[last] = v;
   }
   first_vertex_[gone] = kNone;
-  if (kind_[gone] == PointKind::junction && kind_[kept] != PointKind::locked) kind_[kept] = PointKind::junction;
+  if (on_border_[gone]) on_border_[kept] = true;
+  if (on_outline_[gone]) on_outline_[kept] = true;
+  const bool meets = kind_[gone] == PointKind::junction || (kind_[gone] != PointKind::free && !s.crease);
+  if (meets && kind_[kept] != PointKind::locked) kind_[kept] = PointKind::junction;
 }
 
 void CollapseMesh::drop_orphan(std::uint32_t v) {

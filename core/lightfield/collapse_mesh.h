@@ -2,10 +2,12 @@
 // A mesh of points, vertices and triangles whose edges can collapse: who is around whom, and what a collapse may not
 // do.
 //
-// A crease is an edge with one triangle (border) or whose two triangles do not share both vertices (seam). A point
-// without creases is free; one in the middle of a border or of a seam moves along it only. Where creases end, meet or
-// cannot be told apart it is a junction: it moves along any of its creases, and its vertices that have no partner on
-// the edge go along as they are. Flat shading makes a junction of every point. What find_surface_points locks stays.
+// A crease is an edge with one triangle (border) or whose two triangles do not share both vertices or part (seam). A
+// point without creases is free; others are in the middle of a border or of a seam, or junctions, where creases end,
+// meet or cannot be told apart. A point on a border moves along it only, one on the outline of a part along that.
+// Others cross into a chart beside them as well: the vertex of that chart joins, those of the other charts go along as
+// they are, and what light and texture lose by that has its price (collapse_cost.h). Flat shading makes a junction of
+// every point. What find_surface_points locks stays.
 //
 // Repeat  same bits always
 
@@ -25,7 +27,7 @@ struct EdgeSides {
   std::uint32_t triangles = 0;  // more than 2 where p and q have several edges; then the rest says nothing
   std::array<std::uint32_t, 2> triangle{}, from{}, to{};
   std::uint32_t pairs = 0;  // different ones among (from, to), which stand first
-  bool crease = false;
+  bool crease = false, outline = false;
   bool goes(std::uint32_t v) const { return (pairs > 0 && from[0] == v) || (pairs > 1 && from[1] == v); }
   bool takes(std::uint32_t w) const { return (pairs > 0 && to[0] == w) || (pairs > 1 && to[1] == w); }
 };
@@ -101,6 +103,7 @@ class CollapseMesh {
   void carry_rest(std::uint32_t gone, std::uint32_t kept, const EdgeSides& sides);
   void drop_orphan(std::uint32_t v);
   PointKind find_kind(std::uint32_t p, bool locked);
+  std::uint32_t part_of(std::uint32_t t) const { return lit_.mesh.part.empty() ? 0 : lit_.mesh.part[t]; }
   bool next_to(std::uint32_t p, std::uint32_t q) const;
 
   LitMesh& lit_;
@@ -108,6 +111,7 @@ class CollapseMesh {
   std::vector<std::uint32_t> head_, tail_, next_;                  // corners of a vertex
   std::vector<PointKind> kind_;
   std::vector<bool> gone_;
+  std::vector<bool> on_border_, on_outline_;  // points; a part's outline: borders, and where another begins
   std::size_t left_ = 0;
   std::vector<std::uint32_t> mark_, ring_, common_;
   Joined joined_;

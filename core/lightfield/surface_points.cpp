@@ -85,8 +85,32 @@ class Gluer {
     if (rest.size() == 2 && rest[0].up != rest[1].up) {
       glue(rest[0], rest[1]);
     } else if (rest.size() > 1) {
+      glue_what_goes_on(rest);
       for (const HalfEdge& e : rest) stuck_[e.corner] = stuck_[next_corner(e.corner)] = true;
     }
+  }
+  /// Two that run on into each other are one sheet, whatever else touches it there.
+  void glue_what_goes_on(std::vector<HalfEdge>& edges) {
+    constexpr double kFlat = 0.7;     // cosine between their normals
+    constexpr std::size_t kMost = 8;  // of more nobody can tell
+    while (edges.size() > 1 && edges.size() <= kMost) {
+      std::pair<std::size_t, std::size_t> which;
+      double best = -1;
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        for (std::size_t k = 0; k < i; ++k) {
+          if (edges[i].up == edges[k].up) continue;
+          const double flat = dot(normal(edges[i]), normal(edges[k]));
+          if (flat > best) best = flat, which = {i, k};
+        }
+      }
+      if (best < kFlat) return;
+      glue(edges[which.first], edges[which.second]);
+      edges.erase(edges.begin() + static_cast<std::ptrdiff_t>(which.first));  // the later one
+      edges.erase(edges.begin() + static_cast<std::ptrdiff_t>(which.second));
+    }
+  }
+  Vec3d normal(const HalfEdge& e) const {
+    return normalized(to_double(area_vector(mesh_, mesh_.triangles[e.corner / 3])));
   }
   /// They run in opposite directions: where one begins the other ends.
   void glue(const HalfEdge& a, const HalfEdge& b) {

@@ -1,5 +1,6 @@
 // Surface light fields: what the algebra, the metric and simplification cost, and how far off results are.
 //   kiln_light_field all MODELS                        the tables of core/lightfield/README.md; MODELS: shared/models
+//   kiln_light_field carried FILE [RATIO]              one simplification of a scene.glb that has its light
 //   kiln_light_field scale VERTICES [DEGREE] [RATIO]   time and memory of one simplification
 //   kiln_light_field figures MODELS FOLDER             its pictures: figure7.jpg, figure8.jpg, figure9.jpg
 #include <sys/resource.h>
@@ -11,6 +12,7 @@
 #include <optional>
 #include <string>
 
+#include "core/artifact/carried_scene.h"
 #include "core/base/random.h"
 #include "core/lightfield/hemisphere_norm.h"
 #include "core/lightfield/mean_radiance.h"
@@ -178,10 +180,10 @@ void tell(const char* bench, const std::string& by, const LitMesh& truth, const 
           double estimate = 0) {
   const LightFieldError e = compare(truth, found);
   std::printf(R"({"bench":"%s","by":"%s","triangles":%zu,"degree":%d,"bytes":%.0f,"seconds":%.2f,)"
-              R"("light_error":%.4f,"distance_percent":%.4f,"estimate":%.4f})"
+              R"("light_error":%.4f,"distance_percent":%.4f,"texture_percent":%.4f,"estimate":%.4f})"
               "\n",
               bench, by.c_str(), found.mesh.triangles.size(), found.field.degree, bytes_of(found), seconds, e.light,
-              e.distance, estimate);
+              e.distance, e.texture, estimate);
   std::fflush(stdout);
 }
 
@@ -341,6 +343,17 @@ bool draw_figures(const std::string& models, const std::string& folder) {
   return written;
 }
 
+/// A light field as it was baked, with its materials' seams.
+bool measure_carried(const std::string& path, double ratio) {
+  const auto files = read_scene_files(path);
+  auto carried = files ? import_carried_scene(*files) : tl::make_unexpected(files.error());
+  if (!carried) return std::fprintf(stderr, "%s: %s\n", path.c_str(), carried.error().message.c_str()), false;
+  const LitMesh lit{std::move(carried->scene.mesh), std::move(carried->field)};
+  const auto target = static_cast<std::size_t>(ratio * static_cast<double>(lit.mesh.triangles.size()));
+  tell_ours("carried", "ours, edge", lit, {.triangles = target});
+  return true;
+}
+
 /// The tables of core/lightfield/README.md but for a million vertices, whose memory is measured alone.
 void measure_all(const std::string& models) {
   for (const int degree : {0, 2, 4, 6, 8}) measure_distance(degree);
@@ -361,11 +374,14 @@ int main_of(int argc, char** argv) {
   } else if (what == "scale") {
     const auto number = [&](int i, double absent) { return argc > i ? std::stod(argv[i]) : absent; };
     measure_scale(static_cast<std::uint32_t>(number(2, 1e5)), static_cast<int>(number(3, 4)), number(4, 0.25));
+  } else if (what == "carried") {
+    return measure_carried(argv[2], argc > 3 ? std::stod(argv[3]) : 0.25) ? 0 : 1;
   } else if (what == "figures" && argc == 4) {
     return draw_figures(argv[2], argv[3]) ? 0 : 1;
   } else {
     return std::fprintf(stderr,
-                        "kiln_light_field all MODELS | scale VERTICES [DEGREE] [RATIO] | figures MODELS FOLDER\n"),
+                        "kiln_light_field all MODELS | carried FILE [RATIO] | scale VERTICES [DEGREE] [RATIO] | "
+                        "figures MODELS FOLDER\n"),
            2;
   }
   return 0;

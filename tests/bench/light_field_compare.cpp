@@ -75,10 +75,32 @@ double mean_squared_distance(const Mesh& from, const Mesh& to, const Visit& visi
   return sum / static_cast<double>(kPoints);
 }
 
+Vec2f mix(const std::vector<Vec2f>& values, const Triangle& t, const Vec3d& w) {
+  const Vec3f f = to_float(w);
+  return values[t[0]] * f.x + values[t[1]] * f.y + values[t[2]] * f.z;
+}
+
+/// How far the texture has slid there, as a length on the surface of the truth.
+double texture_shift(const Mesh& truth, const Sampled& s, const Mesh& found, const SurfaceMatch& m) {
+  const Triangle& t = truth.triangles[s.triangle];
+  const Vec2f off =
+      mix(found.uv0, found.triangles[m.triangle], {1 - m.u - m.v, m.u, m.v}) - mix(truth.uv0, t, s.weights);
+  const Vec2f a = truth.uv0[t[1]] - truth.uv0[t[0]], b = truth.uv0[t[2]] - truth.uv0[t[0]];
+  const double texels = std::abs(double{a.x} * double{b.y} - double{a.y} * double{b.x}) / 2;
+  return texels > 0 ? std::sqrt(double{dot(off, off)} * triangle_area(truth, t) / texels) : 0;
+}
+
+double rms(const std::vector<double>& values) {
+  double squares = 0;
+  for (const double x : values) squares += x * x;
+  return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
+}
+
 }  // namespace
 
 LightFieldError compare(const LitMesh& truth, const LitMesh& found) {
   const HemisphereNorm norm(truth.field.degree);
+  std::vector<double> shifts;
   double difference = 0, size = 0;
   const double there = mean_squared_distance(truth.mesh, found.mesh, [&](const Sampled& s, const SurfaceMatch& m) {
     const Triangle& t = truth.mesh.triangles[s.triangle];
@@ -89,13 +111,17 @@ LightFieldError compare(const LitMesh& truth, const LitMesh& found) {
     size += squared_norm(norm, n, a);
     for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
     difference += squared_norm(norm, n, a);
+    if (!truth.mesh.uv0.empty()) shifts.push_back(texture_shift(truth.mesh, s, found.mesh, m));
   });
   const double back = mean_squared_distance(found.mesh, truth.mesh, [](const Sampled&, const SurfaceMatch&) {});
   Vec3f low = truth.mesh.position[0], high = low;
   for (const Vec3f& p : truth.mesh.position)
     for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], p[a]), high[a] = std::max(high[a], p[a]);
+  const double diagonal = length(to_double(high) - to_double(low));
+  for (double& shift : shifts) shift = std::min(shift, 0.01 * diagonal);  // other charts, far away in the atlas
   return {.light = std::sqrt(difference / size),
-          .distance = 100 * std::sqrt(0.5 * (there + back)) / length(to_double(high) - to_double(low))};
+          .texture = 100 * rms(shifts) / diagonal,
+          .distance = 100 * std::sqrt(0.5 * (there + back)) / diagonal};
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <set>
 
 #include "tests/core/lightfield/lit_models.h"
 
@@ -347,6 +348,97 @@ TEST_P(EitherCollapse, WhereSeamsMeetNothingOpens) {
   for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t)
     for (const std::uint32_t v : out.mesh.triangles[t])
       EXPECT_NEAR(out.mesh.uv0[v].x, static_cast<float>(out.mesh.part[t]), 1e-6);
+}
+
+/// A sphere in bands, each a chart with vertices of its own and its uvs elsewhere.
+LitMesh banded_sphere() {
+  LitMesh lit = sphere(12, [](const Vec3f& p) { return Vec3f{1 + p.x, 1, 1 + p.y}; });
+  lit.mesh.uv0.assign(lit.mesh.position.size(), {});
+  std::map<std::pair<std::uint32_t, int>, std::uint32_t> own;
+  for (Triangle& t : lit.mesh.triangles) {
+    const auto band = static_cast<int>(12 * (centroid(lit.mesh, t).y + 0.5F));
+    for (std::uint32_t& v : t) {
+      const auto key = std::pair(v, band);
+      if (!own.contains(key)) {
+        own[key] = append_vertex(lit, lit, v);
+        const Vec3f p = lit.mesh.position[v];
+        lit.mesh.uv0.back() = {std::atan2(p.z, std::abs(p.x)) + 10 * static_cast<float>(band), p.y};
+      }
+      v = own[key];
+    }
+  }
+  return lit;
+}
+
+TEST_P(EitherCollapse, NarrowChartsAreCrossedAndNothingOpens) {
+  // Along seams alone each of eleven loops between the bands keeps a triangle: 88 triangles were left so.
+  const LitMesh out = simplified(banded_sphere(), {.triangles = 40, .collapse = GetParam()});
+  expect_sound(out);
+  EXPECT_LE(out.mesh.triangles.size(), 40U);
+  EXPECT_EQ(border_edges(out.mesh), 0U);
+  EXPECT_EQ(euler(out.mesh), 2);
+  for (const auto& [edge, count] : edges_in_space(out.mesh)) EXPECT_EQ(count, 1);
+  for (const Triangle& t : out.mesh.triangles) EXPECT_GT(dot(area_vector(out.mesh, t), centroid(out.mesh, t)), 0);
+}
+
+TEST(Simplify, TexturesThatWouldSlideHaveTheirPrice) {
+  // Constant light on a flat sheet: only the texture tells the halves apart. Left it bends, right it is straight.
+  LitMesh lit = sheet(40, flat);
+  for (const Vec3f& p : lit.mesh.position)
+    lit.mesh.uv0.push_back({p.x, p.x < 0 ? p.y + 0.02F * std::sin(60 * p.x) * std::sin(60 * p.y) : p.y});
+  const LitMesh out = simplified(lit, {.triangles = 800});
+  std::size_t left = 0;
+  for (const Vec3f& p : out.mesh.position) left += p.x < 0;
+  EXPECT_GT(left, 4 * (out.mesh.position.size() - left));
+}
+
+TEST_P(EitherCollapse, ABorderIsNeverPinched) {
+  // Flat shading: every edge is a seam, those from one border across to another as well.
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed, 7);
+    LitMesh lit = sheet(8, flat, [&](const Vec3f&) { return Vec3f{random.uniform(), random.uniform(), 0}; });
+    std::erase_if(lit.mesh.triangles, [&](const Triangle& t) { return std::abs(centroid(lit.mesh, t).y) > 0.25F; });
+    lit.mesh.part.assign(lit.mesh.triangles.size(), 0);
+    const LitMesh out = simplified(testing::flat_shaded(lit), {.triangles = 10, .collapse = GetParam()});
+    std::map<std::uint32_t, int> borders;
+    const auto edges = edges_in_space(out.mesh);
+    for (const auto& [edge, count] : edges)
+      if (!edges.contains({edge.second, edge.first})) ++borders[edge.first];
+    for (const auto& [place, count] : borders) EXPECT_EQ(count, 1) << seed;
+  }
+}
+
+TEST_P(EitherCollapse, AFinOnASeamHoldsUpItselfAndNotTheGroundThatItStandsOn) {
+  LitMesh lit = seamed(16);
+  std::ranges::fill(lit.field.coefficients, 1.0F);
+  const LitMesh fin = sheet(16, flat);
+  const auto first = static_cast<std::uint32_t>(lit.mesh.position.size());
+  for (std::uint32_t v = 0; v < fin.mesh.position.size(); ++v) {
+    append_vertex(lit, lit, 0);
+    const Vec3f p = fin.mesh.position[v];
+    lit.mesh.position.back() = {0.5F, p.y, p.x + 0.5F};
+    lit.mesh.normal.back() = {1, 0, 0};
+  }
+  for (const Triangle& t : fin.mesh.triangles) {
+    lit.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    lit.mesh.part.push_back(2);
+  }
+  Threads threads(1);
+  const LitMesh out = simplify(lit, {.triangles = 0, .max_error = 0.02, .collapse = GetParam()}, threads).lit;
+  expect_sound(out);
+  std::set<float> feet, under;  // on the line, of the fin and of the ground
+  double area = 0;
+  for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t) {
+    const bool upright = out.mesh.part[t] == 2;
+    if (!upright) area += triangle_area(out.mesh, out.mesh.triangles[t]);
+    for (const std::uint32_t v : out.mesh.triangles[t]) {
+      const Vec3f p = out.mesh.position[v];
+      if (std::abs(p.x - 0.5F) < 1e-3F && std::abs(p.z) < 1e-3F) (upright ? feet : under).insert(p.y);
+    }
+  }
+  EXPECT_NEAR(area, 2, 1e-3);
+  EXPECT_EQ(feet.size(), 17U);  // as they were
+  EXPECT_LT(under.size(), 6U);
 }
 
 // Bad input.
