@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <sstream>
 #include <utility>
@@ -153,6 +154,13 @@ std::optional<double> PlyNumbers::next_text() {
   body_ = body_.subspan(length);
   if (length == 0 || error != std::errc() || end != text + length) return std::nullopt;
   return value;
+}
+
+std::optional<std::uint64_t> PlyNumbers::next_count(PlyType type) {
+  const auto count = next(type);
+  const bool whole = count && *count >= 0 && *count <= static_cast<double>(left()) && *count == std::floor(*count);
+  if (!whole) return std::nullopt;  // not a number among them
+  return static_cast<std::uint64_t>(*count);
 }
 
 std::optional<double> PlyNumbers::next(PlyType type) {

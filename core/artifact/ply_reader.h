@@ -43,6 +43,8 @@ class PlyNumbers {
   PlyNumbers(std::span<const std::uint8_t> body, PlyForm form) : body_(body), form_(form) {}
   /// Nothing at the end of the file or where no number stands.
   std::optional<double> next(PlyType);
+  /// The next number as the length of a list: nothing where it is none that the rest of the file can hold.
+  std::optional<std::uint64_t> next_count(PlyType);
   std::uint64_t left() const { return body_.size(); }
 
  private:

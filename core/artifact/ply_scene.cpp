@@ -45,14 +45,10 @@ void fail_truncated(const PlyElement& e, std::uint64_t i, Findings& findings) {
 
 /// Reads one property; a list into `values`, a single number as a list of one.
 bool read_property(PlyNumbers& in, const PlyProperty& p, std::vector<double>& values) {
-  double count = 1;
-  if (p.list) {
-    const auto read = in.next(*p.list);
-    if (!read || *read < 0 || *read > static_cast<double>(in.left())) return false;
-    count = *read;
-  }
+  const auto count = p.list ? in.next_count(*p.list) : std::optional<std::uint64_t>(1);
+  if (!count) return false;
   values.clear();
-  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(count); ++i) {
+  for (std::uint64_t i = 0; i < *count; ++i) {
     const auto value = in.next(p.type);
     if (!value) return false;
     values.push_back(*value);

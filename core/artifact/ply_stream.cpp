@@ -94,14 +94,9 @@ class Cursor {
   /// One property's values; false at the end, or where a count is none.
   bool read(const PlyProperty& p, std::vector<double>& values) {
     values.clear();
-    std::uint64_t count = 1;
-    if (p.list) {
-      const auto read = next(*p.list);
-      if (!read || *read < 0 || *read != std::floor(*read) || *read > static_cast<double>(numbers_.left()))
-        return false;
-      count = static_cast<std::uint64_t>(*read);
-    }
-    for (std::uint64_t i = 0; i < count; ++i) {
+    const auto count = p.list ? numbers_.next_count(*p.list) : std::optional<std::uint64_t>(1);
+    if (!count) return false;
+    for (std::uint64_t i = 0; i < *count; ++i) {
       if (i > kMostCorners && p.list) values.resize(kMostCorners + 1);  // too many already: only their number matters
       const auto value = next(p.type);
       if (!value) return false;

@@ -25,12 +25,12 @@ struct Sample {
 
 Sample look_at(pid_t pid, Clock::time_point begin) {
   const std::string process = "/proc/" + std::to_string(pid);
-  std::ifstream memory(process + "/statm");
-  long pages = 0, resident = 0;
-  memory >> pages >> resident;
+  std::ifstream memory(process + "/smaps_rollup");  // exact: statm lags by up to 64 pages a thread
+  double resident_kb = 0;
+  for (std::string word; memory >> word && resident_kb == 0;)
+    if (word == "Rss:") memory >> resident_kb;
   const auto files = std::filesystem::directory_iterator(process + "/fd");
-  return {seconds_since(begin) / 3600, static_cast<double>(resident) * 4096 / 1e6,
-          static_cast<int>(std::distance(files, {}))};
+  return {seconds_since(begin) / 3600, resident_kb * 1024 / 1e6, static_cast<int>(std::distance(files, {}))};
 }
 
 /// Least squares over the samples after the first fifth, in which caches fill.

@@ -95,6 +95,8 @@ TEST(ImportPly, BrokenFilesNameTheirPlace) {
       {head + "0 0 0 1 0 0 1 1 0 0 1 x 3 0 1 2", "ply_truncated", "element vertex 3"},
       {head + "0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 4", "index_out_of_range", "element face 0"},
       {head + "0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 -1", "index_out_of_range", "element face 0"},
+      {head + "0 0 0 1 0 0 1 1 0 0 1 0 2.5 0 1 2", "ply_truncated", "element face 0"},
+      {head + "0 0 0 1 0 0 1 1 0 0 1 0 nan 0 1 2", "ply_truncated", "element face 0"},
       {head + "0 0 0 1 0 0 1 1 0 0 1 0 200 0 1 2", "ply_truncated", "element face 0"},
   };
   for (const Case& c : cases) {
