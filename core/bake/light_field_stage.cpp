@@ -37,7 +37,8 @@ void put_level(FieldLevel& level, BakedScene& baked) {
 }
 
 FieldLevelReport report_of(const FieldLevel& level, std::string file) {
-  return {.file = std::move(file), .estimate = level.estimate, .reached = level.reached, .certificate = {}};
+  return {
+      .file = std::move(file), .estimate = level.estimate, .reached = level.reached, .follows = {}, .certificate = {}};
 }
 
 }  // namespace
@@ -141,6 +142,8 @@ Result<FieldOutcome> LightFieldStage::finish(Bytes& glb, const BakedScene& decod
     glb = std::move(with);
   }
   judge(decoded, glb.size(), outcome_.levels.front());
+  LevelPictures before;
+  if (levels_.levels.size() > 1) before = level_pictures(decoded, decoded.scene.mesh, threads);
   for (std::size_t k = 1; k < levels_.levels.size(); ++k) {
     BakedScene level = decoded;
     put_level(levels_.levels[k], level);
@@ -150,6 +153,9 @@ Result<FieldOutcome> LightFieldStage::finish(Bytes& glb, const BakedScene& decod
     KILN_TRY(shown, read_baked_glb(file));
     shown.scene.images = decoded.scene.images;
     judge(shown, file.size(), outcome_.levels[k]);
+    LevelPictures pictures = level_pictures(shown, decoded.scene.mesh, threads);
+    outcome_.levels[k].follows = level_switch(before, pictures);
+    before = std::move(pictures);
     outcome_.lods.push_back(std::move(file));
     threads.check();
   }

@@ -8,6 +8,7 @@
 
 #include "core/artifact/baked_scene.h"
 #include "core/bake/bake_log.h"
+#include "core/bake/level_switch.h"
 #include "core/bake/light_field_certificate.h"
 #include "core/bake/light_field_levels.h"
 #include "core/bake/plan.h"
@@ -23,6 +24,7 @@ struct FieldLevelReport {
   std::uint64_t bytes = 0;
   double estimate = 0;  // as FieldLevel
   bool reached = true;
+  std::optional<LevelSwitch> follows;  // how large it may be where it takes the place of the level before
   std::optional<FieldCertificate> certificate;
 };
 

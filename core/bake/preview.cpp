@@ -55,18 +55,6 @@ Camera frame_camera(const Mesh& mesh, const Preview& preview) {
   return {middle + back * distance, -back, right * (kHalfView * aspect), up * kHalfView};
 }
 
-/// The first face that looks at the camera, passing through those that look away.
-Hit first_facing(const Tracer& tracer, Vec3f origin, const Vec3f& direction) {
-  for (int layer = 0; layer < 16; ++layer) {
-    const Hit hit = tracer.closest(origin, direction, std::numeric_limits<float>::infinity());
-    if (!hit || !hit.back) return hit;
-    const SurfacePoint place = surface_point(tracer.scene(), hit.triangle, hit.u, hit.v);
-    origin = offset_origin(place.position, place.geometric_normal);
-    if (dot(place.geometric_normal, direction) < 0) origin = offset_origin(place.position, -place.geometric_normal);
-  }
-  return {};
-}
-
 /// `height` of the picture: 0 below, 1 above.
 Vec3f background(float height) {
   const float t = std::clamp(height, 0.0F, 1.0F);
@@ -228,6 +216,17 @@ float exposure_of(std::span<const Vec3f> seen) {
 }
 
 }  // namespace
+
+Hit first_facing(const Tracer& tracer, Vec3f origin, const Vec3f& direction) {
+  for (int layer = 0; layer < 16; ++layer) {
+    const Hit hit = tracer.closest(origin, direction, std::numeric_limits<float>::infinity());
+    if (!hit || !hit.back) return hit;
+    const SurfacePoint place = surface_point(tracer.scene(), hit.triangle, hit.u, hit.v);
+    origin = offset_origin(place.position, place.geometric_normal);
+    if (dot(place.geometric_normal, direction) < 0) origin = offset_origin(place.position, -place.geometric_normal);
+  }
+  return {};
+}
 
 Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview& preview,
                              Threads& threads) {

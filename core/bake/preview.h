@@ -18,6 +18,9 @@ struct Preview {
   int grid = 2;  // grid x grid rays a pixel
 };
 
+/// The first face that looks at the eye, passing through those that look away.
+Hit first_facing(const Tracer&, Vec3f eye, const Vec3f& direction);
+
 /// PNG. `tracer` traces decoded.scene, whose images carry pixels where textures shall show.
 Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview&, Threads&);
 

@@ -185,6 +185,8 @@ ordered_json field_object(const FieldOutcome& f) {
                       {"bytes", level.bytes},
                       {"simplification", level.estimate},
                       {"reached", level.reached},
+                      {"screen_pixels", level.follows ? ordered_json(level.follows->pixels) : ordered_json()},
+                      {"screen_difference", level.follows ? ordered_json(level.follows->difference) : ordered_json()},
                       {"certificate", field_certificate_object(level.certificate)}});
   }
   return {{"degree", f.degree},

@@ -244,8 +244,8 @@ const kReport = {
     certificate: certificate(0.05),
     levels: [
       { file: 'scene.glb', vertices: 1, triangles: 1, certificate: certificate(0.05) },
-      { file: 'lod1.glb', vertices: 1234, triangles: 2000, certificate: certificate(0.1) },
-      { file: 'lod2.glb', vertices: 123, triangles: 200, certificate: null },
+      { file: 'lod1.glb', vertices: 1234, triangles: 2000, screen_pixels: 400, certificate: certificate(0.1) },
+      { file: 'lod2.glb', vertices: 123, triangles: 200, screen_pixels: 100, certificate: null },
     ],
   },
 };
@@ -419,15 +419,41 @@ test('levels of detail follow the slider, under the same eye, and leave nothing 
     assert.equal(await memory(page), before);
   }));
 
+test('a level is as coarse as its size on the screen allows, and none flickers', () =>
+  withField('', async (page) => {
+    const back = (distance) =>
+      page.evaluate((d) => {
+        window.kilnViewer.stage.pose = [0, 0, d, 0, 0, 0];
+        return window.kilnViewer.stage.pixelsAcross;
+      }, distance);
+    const shows = (index) => until(page, (wanted) => window.kilnViewer.shown.get().index === wanted, index);
+    const twice = (await back(8)) * Math.sqrt(63); // focal lengths in pixels: the outline is seen at sqrt(d^2 - 1)
+    const at = async (size) => assert.ok(Math.abs((await back(Math.hypot(1, twice / size))) - size) < 1e-6 * size);
+    await at(390);
+    await shows(0);
+    await page.getByText('As coarse as its size on the screen allows').click();
+    await shows(0); // above nine tenths of 400
+    await at(350);
+    await shows(1);
+    await at(390);
+    await shows(1);
+    await at(410);
+    await shows(0);
+    await at(85);
+    await shows(2);
+    assert.equal(await back(0.5), Infinity);
+    await shows(0);
+  }));
+
 test('the panel tells degree, bytes, and what the report certifies', () =>
   withField('', async (page) => {
     const rows = await page.locator('.levels tbody tr').allInnerTexts();
     const bytes = (name) => `${(fixture(name).length / 1000).toPrecision(3)} kB`;
     assert.deepEqual(rows.slice(1).map((row) => row.split('\t')), [
-      ['lod1.glb', '1,234', bytes('lod1.glb'), '10.0\u00a0%'],
-      ['lod2.glb', '123', bytes('lod2.glb'), '–'],
+      ['lod1.glb', '1,234', bytes('lod1.glb'), '10.0\u00a0%', '400'],
+      ['lod2.glb', '123', bytes('lod2.glb'), '–', '100'],
     ]);
-    assert.match(rows[0], /^scene\.glb\t.*\t5\.0\u00a0%$/);
+    assert.match(rows[0], /^scene\.glb\t.*\t5\.0\u00a0%\t–$/);
     await page.getByText('Statistics').click();
     const text = await page.locator('.statistics').innerText();
     assert.match(text, /4: 25 × RGB a vertex/);

@@ -42,6 +42,9 @@ TEST(LightFieldBake, OfADiffuseRoomHoldsItsCertificateAndLevelsGetWorse) {
     EXPECT_LE(level["triangles"].get<std::size_t>(), triangles);
     EXPECT_TRUE(level["triangles"].get<std::size_t>() < triangles || !level["reached"].get<bool>());
     EXPECT_GE(low, 0);
+    EXPECT_EQ(level["screen_pixels"].is_null(), level["file"] == "scene.glb");
+    const bool seen = level["screen_pixels"].is_null() || level["screen_pixels"] == 0;
+    EXPECT_TRUE(seen || level["screen_difference"] <= 2.3);
     before = error;
     triangles = level["triangles"];
     const auto decoded = read_baked_glb(file(out, level["file"]));

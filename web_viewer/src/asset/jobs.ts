@@ -156,6 +156,7 @@ export interface LevelReport {
   file: string;
   vertices: number;
   triangles: number;
+  screen_pixels?: number | null; // how large it may be where it takes the place of the level before
   certificate?: { relrmse: number } | null; // towards every eye, against the surface as it was baked
 }
 

@@ -115,6 +115,15 @@ export class Stage {
     return this.bounds.radius;
   }
 
+  /// Of the sphere around the model on the drawn picture; infinite inside it.
+  get pixelsAcross(): number {
+    const { center, radius } = this.bounds;
+    const distance = this.camera.position.distanceTo(center);
+    if (distance <= radius) return Infinity;
+    const focal = this.renderer.getContext().drawingBufferHeight / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
+    return (2 * focal * radius) / Math.sqrt(distance * distance - radius * radius);
+  }
+
   get pose(): CameraPose {
     const { center, radius } = this.bounds;
     const place = this.camera.position.clone().sub(center).divideScalar(radius);

@@ -9,12 +9,13 @@ import { announce, copyText, h, toast } from '../ui/dom';
 import { Divider } from '../ui/divider';
 import { helpDialog } from '../ui/help';
 import { LegendBox } from '../ui/legend';
-import { levelRows } from '../ui/levels';
+import { haveSizes, levelRows } from '../ui/levels';
 import { statistics } from '../ui/statistics';
 import { ViewPanel } from '../ui/view_panel';
 import { bindAddress } from './address';
 import { type KeyActions, listenToKeys, resetView } from './keyboard';
 import { fetchLevel, Level, levelsOf } from './level';
+import { LevelBySize } from './level_by_size';
 import { Lights } from './lights';
 import type { Page } from './page';
 import { Probe } from './probe';
@@ -77,6 +78,10 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
   const levels = levelRows(levelsOf(job), report, viewer.model);
   const grid = artifact(job, 'grid.exr') !== undefined;
   const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels });
+  if (haveSizes(levels)) {
+    const bySize = new LevelBySize(viewer, levels.map(({ pixels }) => pixels ?? Infinity));
+    page.onDispose(() => bySize.dispose());
+  }
   const divider = new Divider(area, state);
   const legend = new LegendBox();
   const probe = new Probe(area, viewer);

@@ -31,6 +31,7 @@ export interface ViewState {
   channel: number;
   slot: number;
   level: number; // of detail; 0: the finest
+  levelBySize: boolean; // see level_by_size.ts
   detail: number; // share of a progressive mesh, see progressive_view.ts; 1: the file's own triangles
   ball: boolean; // of a grid: see grid_view.ts
   ballAt: readonly [number, number, number] | null; // from the middle of the grid, in its half extents
@@ -58,6 +59,7 @@ export const kDefaultState: ViewState = {
   channel: 0,
   slot: 0,
   level: 0,
+  levelBySize: false,
   detail: 1,
   ball: true,
   ballAt: null,
@@ -119,6 +121,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     channel: Math.round(number('channel', 0, 2)),
     slot: Math.round(number('slot', 0, 100)),
     level: Math.round(number('level', 0, 99)),
+    levelBySize: flag('levelBySize'),
     detail: number('detail', 0, 1),
     ball: flag('ball'),
     ballAt: placeIn(from.get('ballAt')),
