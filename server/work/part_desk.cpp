@@ -49,7 +49,7 @@ PartDesk::PartDesk(const Claim& claim, const WorkPlace& place, std::filesystem::
     }
   }
   if (foreign) {
-    static_cast<void>(place_.store.forget_parts(claim_.ref.job_id));
+    static_cast<void>(place_.store.forget_parts(claim_.ref));
     known_.clear();
   }
   open_ = known_;
@@ -115,7 +115,7 @@ void PartDesk::beat() {
 void PartDesk::handle(const News& news) {
   if (!news.line) {
     checkpoint_ = news.checkpoint;
-    static_cast<void>(place_.store.forget_parts(claim_.ref.job_id));
+    static_cast<void>(place_.store.forget_parts(claim_.ref));
     open_.clear();
   } else if (const auto* given = std::get_if<WorkerShare>(&*news.line)) {
     share(*given);
