@@ -160,9 +160,13 @@ class JobRun {
     WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
     if (claim_.job.part) return conclude_part(std::move(order), path, *limits, pulse);
     order.checkpoint = checkpoint_.load();
-    order.sharing = place_.options.sharing;
     std::optional<PartDesk> desk;
-    if (order.sharing.least_s > 0) order.known = desk.emplace(claim_, place_, path, order.checkpoint).known();
+    if (place_.options.sharing.least_s > 0) desk.emplace(claim_, place_, path, order.checkpoint);
+    if (desk && desk->worker_end() < 0) desk.reset();
+    if (desk) {
+      order.sharing = place_.options.sharing;
+      order.known = desk->known();
+    }
     const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
     const WorkerOutcome outcome = bake(*folder, *limits, pulse, desk ? &*desk : nullptr);
@@ -187,7 +191,7 @@ class JobRun {
     WorkerNews news{[&](const ProgressEvent& event) { pulse.progress(event); }, {}, {}};
     if (!claim_.job.part) news.checkpoint = [&](const std::string& text) { checkpoint_.save(text); };
     if (desk != nullptr) {
-      news.parts = [desk](const WorkerLine& line) { desk->hear(line); };
+      news.parts = [desk](const WorkerLine& line) { return desk->hear(line); };
       news.checkpoint = [this, desk](const std::string& text) {
         checkpoint_.save(text);
         desk->pass_ended(text);
