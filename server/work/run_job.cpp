@@ -52,10 +52,15 @@ WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const L
   return order;
 }
 
-std::uint64_t scene_bytes(const WorkFolder& folder) {
-  std::error_code error;
-  const auto bytes = std::filesystem::file_size(folder.path() / input_path(0), error);
-  return error ? 0 : bytes;
+/// Of the files that its worker maps: the scene, and the journal of a part.
+std::uint64_t mapped_bytes(const WorkFolder& folder) {
+  std::uint64_t sum = 0;
+  for (const std::string& file : {input_path(0), std::string("inputs/journal")}) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(folder.path() / file, error);
+    if (!error) sum += bytes;
+  }
+  return sum;
 }
 
 /// Progress and heartbeats of one run, from the first byte of input that is fetched to the last of a result that is
@@ -85,6 +90,7 @@ class Pulse {
     if (newest_.fraction > 0.01) newest_.eta_s = elapsed * (1 - newest_.fraction) / newest_.fraction;
     if (!new_stage && now - shown_ < kShowProgressEvery) return;
     shown_ = now;
+    if (claim_.job.part) return;  // in no stream
     place_.bus.announce_progress(claim_.ref.job_id, newest_);
   }
 
@@ -197,7 +203,7 @@ class JobRun {
         desk->pass_ended(text);
       };
     }
-    return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder),
+    return run_worker({place_.options.worker_command, folder.path(), memory, mapped_bytes(folder),
                        desk != nullptr ? desk->worker_end() : -1},
                       {memory, limits.wall_s}, stop_, news);
   }
@@ -266,7 +272,7 @@ class JobRun {
 
   void after_stop() {
     if (stop_.asked() == StopReason::lost) {
-      ++place_.counters.lost_leases;
+      if (!claim_.job.part) ++place_.counters.lost_leases;  // a part ends so with its job
       return;
     }
     if (stop_.asked() == StopReason::drain) {
@@ -305,8 +311,8 @@ class JobRun {
 
   void finish_cancel() {
     const auto ended = persist(stop_, place_.options.lease, [&] { return place_.store.finish_cancel(claim_.ref); });
-    if (!ended) return;
-    if (!claim_.job.part) checkpoint_.remove();
+    if (!ended || claim_.job.part) return;
+    checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);
   }
 
@@ -341,7 +347,7 @@ Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe,
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
   const std::uint64_t memory = limits.memory_mb << 20;
-  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, scene_bytes(folder)},
+  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, mapped_bytes(folder)},
                                            {memory, std::min(limits.wall_s, kPlanWallS)}, stop, {});
   if (outcome.kind == Kind::done) return read_text(folder.result("plan.json"));
   if (outcome.kind == Kind::stopped) return fault("draining", "the server stops");
