@@ -144,7 +144,8 @@ void GivingLoops::join(const SharedLoop& loop, const std::vector<LoopRange>& ran
 
 /// For a successor. Its name; empty when there is no room for it.
 std::string GivingLoops::store_range(const SharedLoop& loop, const LoopRange& range) {
-  const std::string name = "range." + std::to_string(stored_++), file = folder_ + "/" + name;
+  std::string name = "range." + std::to_string(stored_++);
+  const std::string file = folder_ + "/" + name;
   try {
     GrowingFile made(file);
     write_record(made, loop, {range.loop, range.first, range.last});
