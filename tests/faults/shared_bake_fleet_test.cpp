@@ -105,14 +105,14 @@ TEST_F(SharedBakeFleet, APromiseOfSeveralPassesHasTheBytesOfASingleMachine) {
   };
   const Daemon& alone = start("alone", 1, {"--share-s", "0"});
   const std::string scene = upload(alone, pit_glb(8));
-  const json plain = wait_end(alone, submit(alone, promise(scene, false)));
+  const json plain = wait_end(alone, submit(alone, promise(scene, false)), 240s);
   expect_sound(alone, plain);
   nodes_.clear();
 
   for (const char* name : {"w1", "w2", "w3"}) start(name, 1, {"--share-s", "0.05", "--share-repeats", "0"});
   const Daemon& door = *nodes_["w1"];
   const std::string id = submit(door, promise(scene, true));
-  const json shared = wait_end(door, id);
+  const json shared = wait_end(door, id, 240s);
   expect_sound(door, shared);
   EXPECT_EQ(hashes_of(shared), hashes_of(plain));
   EXPECT_EQ(shared["attempt"], 1);
