@@ -64,8 +64,9 @@ struct Claim {
 struct Taker {
   std::string maker;  // whoever has the same word computes the same bits: parts of others are not for him
   std::uint64_t free_mb = std::numeric_limits<std::uint64_t>::max();  // memory not given to jobs yet
-  bool idle = true;         // runs nothing: takes the next job, however much memory that may use
-  Millis patience{30'000};  // smaller jobs overtake one that has no room, until it has waited for so long
+  bool idle = true;  // runs nothing: takes the next job, however much memory that may use
+  Millis patience{
+      30'000};  // smaller jobs overtake one that has no room, until it has waited for so long; parts: always
 };
 
 /// Ranges of a loop that a running job gives away.
@@ -76,7 +77,7 @@ struct NewParts {
 };
 
 struct PartState {
-  std::string id, order;
+  std::string id, order, maker;
   JobState state = JobState::queued;
   std::string sha256;  // of its result, once succeeded
 };
@@ -155,8 +156,8 @@ class JobStore {
   virtual Result<Wrote> add_parts(const ClaimRef& parent, const NewParts&) = 0;
   /// What became of them, oldest first.
   virtual Result<std::vector<PartState>> parts(const std::string& parent) = 0;
-  /// The job goes on where they are of no use.
-  virtual Result<void> forget_parts(const std::string& parent) = 0;
+  /// The job goes on where they are of no use. Those of a job that is another's now stay.
+  virtual Result<void> forget_parts(const ClaimRef& parent) = 0;
   /// This one, for the job itself to compute; nothing when it does not wait any more.
   virtual Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) = 0;
 

@@ -141,6 +141,8 @@ ALTER TABLE kiln.job ADD COLUMN maker kiln.word;
 ALTER TABLE kiln.job ADD COLUMN journal kiln.word REFERENCES kiln.blob(sha256);
 CREATE INDEX job_by_parent ON kiln.job(parent, id) WHERE parent IS NOT NULL;
 CREATE INDEX job_by_journal ON kiln.job(journal) WHERE journal IS NOT NULL;
+UPDATE kiln.job SET memory_mb=coalesce((recipe::json->'limits'->>'memory_mb')::bigint, 0)
+  WHERE state IN ('queued', 'running');
 UPDATE kiln.meta SET version=3;
 )sql";
 

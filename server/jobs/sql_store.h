@@ -29,7 +29,7 @@ class SqlStore final : public JobStore {
   Result<Wrote> finish_cancel(const ClaimRef&) override;
   Result<Wrote> add_parts(const ClaimRef& parent, const NewParts&) override;
   Result<std::vector<PartState>> parts(const std::string& parent) override;
-  Result<void> forget_parts(const std::string& parent) override;
+  Result<void> forget_parts(const ClaimRef& parent) override;
   Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) override;
   Result<int> reap(bool everything) override;
 

@@ -32,12 +32,14 @@ constexpr std::uint64_t kAnyMemory = std::numeric_limits<std::int64_t>::max();
 
 /// The next job by fairness, if there is room for it; a smaller one while that has not waited for long.
 Result<std::optional<std::string>> choose(Connection& db, const Taker& taker, const char* keep_rows, std::int64_t now) {
-  const std::string next = std::string("SELECT id, memory_mb, run_after") + kDue + kFairly + keep_rows;
+  const std::string next = std::string("SELECT id, memory_mb, run_after, CASE WHEN parent IS NULL THEN 0 ELSE 1 END") +
+                           kDue + kFairly + keep_rows;
   KILN_TRY(rows, db.query(next, now, taker.maker, kAnyMemory));
   if (rows.empty()) return std::nullopt;
   const std::uint64_t room = std::min(taker.free_mb, kAnyMemory);
   if (taker.idle || static_cast<std::uint64_t>(rows.front().integer(1)) <= room) return rows.front().text(0);
-  if (now - rows.front().integer(2) > taker.patience.count()) return std::nullopt;
+  const bool part = rows.front().integer(3) != 0;  // its job goes on without help
+  if (!part && now - rows.front().integer(2) > taker.patience.count()) return std::nullopt;
   KILN_TRY(smaller, db.query(next, now, taker.maker, room));
   if (smaller.empty()) return std::nullopt;
   return smaller.front().text(0);

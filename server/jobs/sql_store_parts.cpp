@@ -36,21 +36,24 @@ Result<Wrote> SqlStore::add_parts(const ClaimRef& parent, const NewParts& parts)
 
 Result<std::vector<PartState>> SqlStore::parts(const std::string& parent) {
   return read([&](Connection& db) -> Result<std::vector<PartState>> {
-    KILN_TRY(rows, db.query("SELECT job.id, part_order, state, artifact.sha256 FROM job LEFT JOIN artifact ON "
-                            "artifact.job_id=job.id WHERE parent=? ORDER BY job.id",
+    KILN_TRY(rows, db.query("SELECT job.id, part_order, maker, state, artifact.sha256 FROM job LEFT JOIN artifact ON "
+                            "artifact.job_id=job.id AND artifact.name='range' WHERE parent=? ORDER BY job.id",
                             parent));
     std::vector<PartState> states;
     for (const Row& row : rows) {
-      states.push_back({row.text(0), row.text(1), parse_job_state(row.text(2)).value_or(JobState::failed),
-                        row.is_null(3) ? "" : row.text(3)});
+      states.push_back({row.text(0), row.text(1), row.text(2), parse_job_state(row.text(3)).value_or(JobState::failed),
+                        row.text(4)});
     }
     return states;
   });
 }
 
-Result<void> SqlStore::forget_parts(const std::string& parent) {
+Result<void> SqlStore::forget_parts(const ClaimRef& parent) {
   return write([&](Connection& db, std::int64_t) -> Result<void> {
-    KILN_DO(db.run("DELETE FROM job WHERE parent=?", parent));
+    KILN_DO(
+        db.run("DELETE FROM job WHERE parent=? AND EXISTS(SELECT 1 FROM job own WHERE own.id=? AND "
+               "own.lease_owner=? AND own.fence=?)",
+               parent.job_id, parent.job_id, parent.token, parent.fence));
     return {};
   });
 }

@@ -130,6 +130,7 @@ ALTER TABLE job ADD COLUMN maker TEXT;
 ALTER TABLE job ADD COLUMN journal TEXT REFERENCES blob(sha256);
 CREATE INDEX job_by_parent ON job(parent, id) WHERE parent IS NOT NULL;
 CREATE INDEX job_by_journal ON job(journal) WHERE journal IS NOT NULL;
+UPDATE job SET memory_mb=coalesce(json_extract(recipe, '$.limits.memory_mb'), 0) WHERE state IN ('queued', 'running');
 )sql";
 
 // A table that older programs need not know, so it comes without a new version.

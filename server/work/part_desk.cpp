@@ -1,35 +1,64 @@
 #include "server/work/part_desk.h"
 
+#include <fcntl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
+#include <map>
+#include <string_view>
+#include <utility>
 
-#include "server/work/maker.h"
+#include "server/work/data_folder.h"
 
 namespace kiln {
 namespace {
 
-constexpr Millis kLookEvery{500};  // news of other servers may get lost: this is the truth
+constexpr Millis kLookEvery{500};             // news of other servers may get lost: this is the truth
+constexpr Millis kRest{100};                  // between two looks: the progress of every job here is news
+constexpr std::size_t kMostNews = 16;         // a worker waits for its answers: more is not said at a time
+constexpr std::size_t kMostRanges = 1 << 14;  // of a worker: rows of the store
 
-std::optional<LoopRange> range_of(const PartState& part) {
-  const auto order = parse_part(part.order);
-  return order ? std::optional(order->range) : std::nullopt;
-}
+/// A file of the worker's, who is not to be trusted: no link is followed, and only a regular file is read.
+class WorkerFile {
+ public:
+  explicit WorkerFile(const std::filesystem::path& file)
+      : fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)) {}
+  ~WorkerFile() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  WorkerFile(const WorkerFile&) = delete;
+  WorkerFile& operator=(const WorkerFile&) = delete;
+  bool has(std::uint64_t bytes) const {
+    struct stat status {};
+    return fd_ >= 0 && ::fstat(fd_, &status) == 0 && S_ISREG(status.st_mode) &&
+           static_cast<std::uint64_t>(status.st_size) >= bytes;
+  }
+  /// The next bytes, as many as fit; nothing at the end of the file.
+  std::span<const std::uint8_t> read(std::span<std::uint8_t> piece) const {
+    ssize_t got = 0;
+    do got = ::read(fd_, piece.data(), piece.size());
+    while (got < 0 && errno == EINTR);
+    return piece.first(static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+  }
+
+ private:
+  int fd_;
+};
 
 /// The first bytes of a file that its writer goes on with.
-Result<StoredBlob> store_copy(BlobStore& blobs, const std::filesystem::path& file, std::uint64_t bytes) {
-  std::ifstream in(file, std::ios::binary);
+Result<StoredBlob> store_copy(BlobStore& blobs, const std::filesystem::path& file, std::uint64_t bytes,
+                              const std::function<bool()>& stopping) {
+  const WorkerFile in(file);
+  if (bytes > kMostJournal || !in.has(bytes)) return fault("io_failed", "the journal of a bake cannot be read");
   KILN_TRY(writer, blobs.write());
-  std::vector<char> piece(1 << 20);
+  std::vector<std::uint8_t> buffer(1 << 20);
   for (std::uint64_t left = bytes; left > 0;) {
-    const auto size = static_cast<std::streamsize>(std::min<std::uint64_t>(left, piece.size()));
-    if (!in.read(piece.data(), size)) return fault("io_failed", "the journal of a bake cannot be read");
-    const auto* first = reinterpret_cast<const std::uint8_t*>(piece.data());
-    if (auto wrote = writer.write({first, static_cast<std::size_t>(size)}); !wrote)
-      return tl::make_unexpected(wrote.error());
-    left -= static_cast<std::uint64_t>(size);
+    const auto piece = in.read(std::span(buffer).first(std::min<std::uint64_t>(left, buffer.size())));
+    if (piece.empty() || stopping()) return fault("io_failed", "the journal of a bake was not read to its end");
+    if (auto wrote = writer.write(piece); !wrote) return tl::make_unexpected(wrote.error());
+    left -= piece.size();
   }
   return writer.finish();
 }
@@ -38,21 +67,20 @@ Result<StoredBlob> store_copy(BlobStore& blobs, const std::filesystem::path& fil
 
 PartDesk::PartDesk(const Claim& claim, const WorkPlace& place, std::filesystem::path folder, std::string checkpoint)
     : claim_(claim), place_(place), folder_(std::move(folder)), checkpoint_(std::move(checkpoint)) {
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends_.data()) != 0) return;  // the worker will hear nothing
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends_.data()) != 0) return;
   bool foreign = false;
   for (const PartState& part : place_.store.parts(claim_.ref.job_id).value_or(std::vector<PartState>{})) {
     const auto order = parse_part(part.order);
-    if (!order || order->checkpoint != checkpoint_) {
+    if (!order || order->checkpoint != checkpoint_ || part.maker != maker_) {
       foreign = true;
     } else {
       known_.push_back(order->range);
     }
   }
   if (foreign) {
-    static_cast<void>(place_.store.forget_parts(claim_.ref.job_id));
+    static_cast<void>(place_.store.forget_parts(claim_.ref));
     known_.clear();
   }
-  open_ = known_;
   thread_ = std::thread([this] { work(); });
 }
 
@@ -69,13 +97,18 @@ PartDesk::~PartDesk() {
   }
 }
 
-void PartDesk::hear(const WorkerLine& line) { put({line, {}}); }
-
-void PartDesk::pass_ended(const std::string& checkpoint) { put({std::nullopt, checkpoint}); }
-
-void PartDesk::put(News news) {
+bool PartDesk::hear(const WorkerLine& line) {
   const std::lock_guard lock(mutex_);
-  news_.push(std::move(news));
+  if (news_.size() >= kMostNews) return false;
+  news_.push({line, {}});
+  changed_.notify_all();
+  return true;
+}
+
+void PartDesk::pass_ended(const std::string& checkpoint) {
+  const std::lock_guard lock(mutex_);
+  if (news_.empty() || news_.back().line) news_.emplace();
+  news_.back().checkpoint = checkpoint;
   changed_.notify_all();
 }
 
@@ -113,9 +146,14 @@ void PartDesk::beat() {
 }
 
 void PartDesk::handle(const News& news) {
+  if (!last_fetched_.empty()) {  // the worker has read it
+    std::error_code none;
+    std::filesystem::remove(std::exchange(last_fetched_, {}), none);
+  }
   if (!news.line) {
     checkpoint_ = news.checkpoint;
-    static_cast<void>(place_.store.forget_parts(claim_.ref.job_id));
+    static_cast<void>(place_.store.forget_parts(claim_.ref));
+    loop_.reset();
     open_.clear();
   } else if (const auto* given = std::get_if<WorkerShare>(&*news.line)) {
     share(*given);
@@ -127,7 +165,8 @@ void PartDesk::handle(const News& news) {
 }
 
 void PartDesk::share(const WorkerShare& given) {
-  std::erase_if(open_, [&](const LoopRange& range) { return range.loop == given.loop; });
+  loop_ = given.loop;
+  open_.clear();
   for (std::size_t k = 0; k + 1 < given.cuts.size(); ++k)
     open_.push_back({given.loop, given.cuts[k], given.cuts[k + 1]});
   static_cast<void>(give_away(given));  // what is not in the store is left to the worker
@@ -135,38 +174,57 @@ void PartDesk::share(const WorkerShare& given) {
 }
 
 Result<void> PartDesk::give_away(const WorkerShare& given) {
+  if (given_away_ + open_.size() > kMostRanges) return fault("too_many", "the bake gave away too many ranges");
+  given_away_ += open_.size();
+  if (disk_space(place_.blobs.folder()).free_fraction < place_.options.soft_free_fraction)
+    return fault("disk_full", "the disk is nearly full: nothing more is given away");
   KILN_TRY(gate, place_.store.enter_blob_gate());
-  KILN_TRY(journal, store_copy(place_.blobs, folder_ / "out" / "journal", given.journal_bytes));
-  NewParts parts{{}, maker_word(), {journal.sha256, journal.bytes}};
-  for (std::size_t k = 0; k + 1 < given.cuts.size(); ++k)
-    parts.orders.push_back(part_json({{given.loop, given.cuts[k], given.cuts[k + 1]}, checkpoint_}));
+  KILN_TRY(journal,
+           store_copy(place_.blobs, folder_ / "out" / "journal", given.journal_bytes, [this] { return stopping(); }));
+  NewParts parts{{}, maker_, {journal.sha256, journal.bytes}};
+  for (const LoopRange& range : open_) parts.orders.push_back(part_json({range, checkpoint_}));
   KILN_TRY(added, place_.store.add_parts(claim_.ref, parts));
   static_cast<void>(added);
   return {};
 }
 
 void PartDesk::answer(std::uint64_t loop) {
+  if (loop != loop_) {
+    loop_ = loop;
+    open_.clear();
+    std::ranges::copy_if(known_, std::back_inserter(open_), [&](const LoopRange& range) { return range.loop == loop; });
+  }
   while (!stopping()) {
     const std::uint64_t seen = place_.bus.ticks();
-    if (const auto reply = find_next(loop)) return send(*reply);
+    if (const auto reply = find_next()) return send(*reply);
     place_.bus.wait(seen, std::chrono::steady_clock::now() + kLookEvery);
+    std::this_thread::sleep_for(kRest);
   }
 }
 
 /// A range for the worker to compute; where others have them all, one that is done; nothing while they are at work.
-std::optional<RangeReply> PartDesk::find_next(std::uint64_t loop) {
+std::optional<RangeReply> PartDesk::find_next() {
   const auto parts = place_.store.parts(claim_.ref.job_id);
   if (!parts) return std::nullopt;
-  std::optional<RangeReply> done;
+  // By the whole order: what should be forgotten may be there still, and have the same numbers.
+  std::map<std::string_view, const PartState*> of_order;
+  for (const PartState& part : *parts) {
+    if (part.maker == maker_) of_order.emplace(part.order, &part);
+  }
+  const PartState* done = nullptr;
+  LoopRange made;
   for (const LoopRange& range : open_) {
-    if (range.loop != loop) continue;
-    const auto part = std::ranges::find(*parts, std::optional(range), range_of);
-    if (part == parts->end() || part->state == JobState::failed || part->state == JobState::canceled)
+    const auto found = of_order.find(part_json({range, checkpoint_}));
+    const PartState* part = found == of_order.end() ? nullptr : found->second;
+    if (part == nullptr || part->state == JobState::failed || part->state == JobState::canceled)
       return RangeReply{range, ""};  // nobody will
     if (part->state == JobState::queued && hold(part->id)) return RangeReply{range, ""};
-    if (part->state == JobState::succeeded && !done) done = fetch(*part, range);
+    if (part->state != JobState::succeeded || done != nullptr) continue;
+    done = part;
+    made = range;
   }
-  return done;
+  if (done == nullptr) return std::nullopt;
+  return fetch(*done, made);
 }
 
 bool PartDesk::hold(const std::string& part) {
@@ -177,32 +235,42 @@ bool PartDesk::hold(const std::string& part) {
   return true;
 }
 
-std::optional<RangeReply> PartDesk::fetch(const PartState& part, const LoopRange& range) {
-  const std::string file = "inputs/range." + std::to_string(range.loop) + "." + std::to_string(range.first);
-  if (!place_.blobs.place(part.sha256, folder_ / file)) return RangeReply{range, ""};
-  return RangeReply{range, file};
+RangeReply PartDesk::fetch(const PartState& part, const LoopRange& range) {
+  const std::string file = "inputs/range." + std::to_string(fetched_++);
+  last_fetched_ = folder_ / file;
+  if (!place_.blobs.place(part.sha256, last_fetched_)) return {range, ""};
+  return {range, file};
 }
 
+/// Never waits: only a worker that does not read its answers leaves no room for one.
 void PartDesk::send(const RangeReply& reply) {
   const std::string text = reply_json(reply);
-  static_cast<void>(::send(ends_[1], text.data(), text.size(), MSG_NOSIGNAL));
+  static_cast<void>(::send(ends_[1], text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
   if (!reply.file.empty()) std::erase(open_, reply.range);
 }
 
 /// What the worker made itself is kept for its successor, should it need one.
 void PartDesk::keep(const WorkerMade& made) {
   std::erase(open_, made.range);
-  if (!held_) return;
-  const Claim claim = std::move(*held_);
-  held_.reset();
-  const auto gate = place_.store.enter_blob_gate();
-  if (!gate || !is_artifact_name(made.file)) return;
+  if (const auto held = std::exchange(held_, std::nullopt)) {
+    if (const auto stored = store_made(made, held->ref); !stored)
+      static_cast<void>(place_.store.fail(held->ref, {stored.error(), 500}));  // else somebody would compute it again
+  }
+  if (!is_artifact_name(made.file)) return;
+  std::error_code none;
+  std::filesystem::remove(folder_ / "out" / made.file, none);  // what was not stored only takes room
+}
+
+Result<void> PartDesk::store_made(const WorkerMade& made, const ClaimRef& part) {
+  if (!is_artifact_name(made.file)) return fault("io_failed", "the range could not be written");
+  KILN_TRY(gate, place_.store.enter_blob_gate());
   const std::array files{folder_ / "out" / made.file};
-  const auto stored = place_.blobs.adopt(files);
-  if (!stored) return;
+  KILN_TRY(stored, place_.blobs.adopt(files));
   const std::array artifacts{
-      Artifact{"range", "application/octet-stream", stored->front().sha256, stored->front().bytes}};
-  static_cast<void>(place_.store.commit(claim.ref, artifacts, false));
+      Artifact{"range", "application/octet-stream", stored.front().sha256, stored.front().bytes}};
+  KILN_TRY(wrote, place_.store.commit(part, artifacts, false));
+  static_cast<void>(wrote);
+  return {};
 }
 
 }  // namespace kiln

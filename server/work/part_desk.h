@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/work/maker.h"
 #include "server/work/run_job.h"
 #include "server/work/worker_protocol.h"
 
@@ -21,7 +22,8 @@ namespace kiln {
 
 class PartDesk {
  public:
-  /// `checkpoint` is that of the pass which the worker begins with; parts of other passes are forgotten.
+  /// `checkpoint` is that of the pass which the worker begins with; parts of other passes are forgotten, and those of
+  /// servers that make other bits: the job was theirs before.
   PartDesk(const Claim&, const WorkPlace&, std::filesystem::path folder, std::string checkpoint);
   ~PartDesk();
   PartDesk(const PartDesk&) = delete;
@@ -29,11 +31,11 @@ class PartDesk {
 
   /// Ranges that an earlier worker of this job gave away in this pass.
   const std::vector<LoopRange>& known() const { return known_; }
-  /// Where the worker reads answers: its descriptor 0.
+  /// Where the worker reads answers: its descriptor 0. Negative when there is none to be had: it cannot share then.
   int worker_end() const { return ends_[0]; }
 
-  /// From the thread that listens to the worker; never waits.
-  void hear(const WorkerLine& line);
+  /// From the thread that listens to the worker; never waits. False: no worker that waits for its answers says so much.
+  bool hear(const WorkerLine& line);
   void pass_ended(const std::string& checkpoint);
 
  private:
@@ -41,17 +43,17 @@ class PartDesk {
     std::optional<WorkerLine> line;  // nothing: a pass ended
     std::string checkpoint;
   };
-  void put(News news);
   void work();
   std::optional<News> wait_for_news();
   void handle(const News&);
   void share(const WorkerShare&);
   Result<void> give_away(const WorkerShare&);
   void answer(std::uint64_t loop);
-  std::optional<RangeReply> find_next(std::uint64_t loop);
+  std::optional<RangeReply> find_next();
   bool hold(const std::string& part);
-  std::optional<RangeReply> fetch(const PartState&, const LoopRange&);
+  RangeReply fetch(const PartState&, const LoopRange&);
   void keep(const WorkerMade&);
+  Result<void> store_made(const WorkerMade&, const ClaimRef& part);
   void beat();
   void send(const RangeReply&);
   bool stopping() const;
@@ -59,12 +61,17 @@ class PartDesk {
   const Claim& claim_;
   const WorkPlace& place_;
   const std::filesystem::path folder_;
+  const std::string maker_ = maker_word();
   std::string checkpoint_;
   std::vector<LoopRange> known_;
   std::array<int, 2> ends_{-1, -1};
 
-  std::vector<LoopRange> open_;  // ranges that the worker has not got
-  std::optional<Claim> held_;    // the range that the worker computes, where it is in the store
+  std::optional<std::uint64_t> loop_;   // that was asked for last,
+  std::vector<LoopRange> open_;         // and its ranges that the worker has not got
+  std::size_t given_away_ = 0;          // ranges, by this worker
+  std::size_t fetched_ = 0;             // ranges of others
+  std::filesystem::path last_fetched_;  // that the worker reads now
+  std::optional<Claim> held_;           // the range that the worker computes, where it is in the store
   std::chrono::steady_clock::time_point beaten_;
 
   mutable std::mutex mutex_;

@@ -52,10 +52,15 @@ WorkerOrder order_of(const JobInputs& inputs, const std::string& recipe, const L
   return order;
 }
 
-std::uint64_t scene_bytes(const WorkFolder& folder) {
-  std::error_code error;
-  const auto bytes = std::filesystem::file_size(folder.path() / input_path(0), error);
-  return error ? 0 : bytes;
+/// Of the files that its worker maps: the scene, and the journal of a part.
+std::uint64_t mapped_bytes(const WorkFolder& folder) {
+  std::uint64_t sum = 0;
+  for (const std::string& file : {input_path(0), std::string("inputs/journal")}) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(folder.path() / file, error);
+    if (!error) sum += bytes;
+  }
+  return sum;
 }
 
 /// Progress and heartbeats of one run, from the first byte of input that is fetched to the last of a result that is
@@ -85,6 +90,7 @@ class Pulse {
     if (newest_.fraction > 0.01) newest_.eta_s = elapsed * (1 - newest_.fraction) / newest_.fraction;
     if (!new_stage && now - shown_ < kShowProgressEvery) return;
     shown_ = now;
+    if (claim_.job.part) return;  // in no stream
     place_.bus.announce_progress(claim_.ref.job_id, newest_);
   }
 
@@ -160,9 +166,13 @@ class JobRun {
     WorkerOrder order = order_of(claim_.job.inputs, claim_.job.recipe, *limits, place_.options);
     if (claim_.job.part) return conclude_part(std::move(order), path, *limits, pulse);
     order.checkpoint = checkpoint_.load();
-    order.sharing = place_.options.sharing;
     std::optional<PartDesk> desk;
-    if (order.sharing.least_s > 0) order.known = desk.emplace(claim_, place_, path, order.checkpoint).known();
+    if (place_.options.sharing.least_s > 0) desk.emplace(claim_, place_, path, order.checkpoint);
+    if (desk && desk->worker_end() < 0) desk.reset();
+    if (desk) {
+      order.sharing = place_.options.sharing;
+      order.known = desk->known();
+    }
     const auto folder = WorkFolder::make(path, place_.blobs, order);
     if (!folder) return after_trouble(folder.error());
     const WorkerOutcome outcome = bake(*folder, *limits, pulse, desk ? &*desk : nullptr);
@@ -187,13 +197,13 @@ class JobRun {
     WorkerNews news{[&](const ProgressEvent& event) { pulse.progress(event); }, {}, {}};
     if (!claim_.job.part) news.checkpoint = [&](const std::string& text) { checkpoint_.save(text); };
     if (desk != nullptr) {
-      news.parts = [desk](const WorkerLine& line) { desk->hear(line); };
+      news.parts = [desk](const WorkerLine& line) { return desk->hear(line); };
       news.checkpoint = [this, desk](const std::string& text) {
         checkpoint_.save(text);
         desk->pass_ended(text);
       };
     }
-    return run_worker({place_.options.worker_command, folder.path(), memory, scene_bytes(folder),
+    return run_worker({place_.options.worker_command, folder.path(), memory, mapped_bytes(folder),
                        desk != nullptr ? desk->worker_end() : -1},
                       {memory, limits.wall_s}, stop_, news);
   }
@@ -262,7 +272,7 @@ class JobRun {
 
   void after_stop() {
     if (stop_.asked() == StopReason::lost) {
-      ++place_.counters.lost_leases;
+      if (!claim_.job.part) ++place_.counters.lost_leases;  // a part ends so with its job
       return;
     }
     if (stop_.asked() == StopReason::drain) {
@@ -301,8 +311,8 @@ class JobRun {
 
   void finish_cancel() {
     const auto ended = persist(stop_, place_.options.lease, [&] { return place_.store.finish_cancel(claim_.ref); });
-    if (!ended) return;
-    if (!claim_.job.part) checkpoint_.remove();
+    if (!ended || claim_.job.part) return;
+    checkpoint_.remove();
     ++(*ended == Wrote::done ? place_.counters.canceled : place_.counters.stale_commits);
   }
 
@@ -337,7 +347,7 @@ Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe,
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
   const std::uint64_t memory = limits.memory_mb << 20;
-  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, scene_bytes(folder)},
+  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, mapped_bytes(folder)},
                                            {memory, std::min(limits.wall_s, kPlanWallS)}, stop, {});
   if (outcome.kind == Kind::done) return read_text(folder.result("plan.json"));
   if (outcome.kind == Kind::stopped) return fault("draining", "the server stops");

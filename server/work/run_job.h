@@ -31,6 +31,7 @@ struct WorkOptions {
   Millis first_retry{10'000};
   Millis lease{60'000};  // how long the store waits for a word of a running job's server
   bool require_sandbox = false;
+  double soft_free_fraction = 0;  // of the disk of the blobs; below: no journal is stored
   Sharing sharing;
 };
 

@@ -69,7 +69,8 @@ class Watch {
     } else if (std::holds_alternative<WorkerDone>(*line)) {
       said_done_ = true;
     } else if (news_.parts) {
-      if (!ended_by_us()) news_.parts(*line);
+      if (!ended_by_us() && !news_.parts(*line))
+        end(Kind::internal, {"internal", "the worker did not wait for its answers", ""}, SIGKILL);
     } else {
       end(Kind::internal, {"internal", "the worker offered work to others", ""}, SIGKILL);
     }

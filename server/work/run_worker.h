@@ -53,7 +53,8 @@ struct WorkerOutcome {
 struct WorkerNews {
   std::function<void(const ProgressEvent&)> progress;
   std::function<void(const std::string&)> checkpoint;
-  std::function<void(const WorkerLine&)> parts;  // share, next, made; empty: the worker has no business to say so
+  /// Of share, next and made; false ends the worker. Empty: it has no business to say so.
+  std::function<bool(const WorkerLine&)> parts;
 };
 
 /// Blocks until the process is gone. Never throws, whatever the worker does.

@@ -201,6 +201,7 @@ WorkOptions LocalService::work_options() const {
           .first_retry = options_.first_retry,
           .lease = options_.lease,
           .require_sandbox = options_.require_sandbox,
+          .soft_free_fraction = options_.soft_free_fraction,
           .sharing = others ? options_.sharing : Sharing{}};
 }
 

@@ -7,9 +7,8 @@
 namespace kiln {
 namespace {
 
-constexpr double kTrialS = 1;    // of a loop, before it is judged
-constexpr double kStepS = 0.25;  // between two looks at the clock
-constexpr std::uint64_t kMostJournal = 4ULL << 30;
+constexpr double kTrialS = 1;          // of a loop, before it is judged
+constexpr double kStepS = 0.25;        // between two looks at the clock
 constexpr double kJournal = 300e6;     // bytes that are stored, fetched and read in a second
 constexpr std::uint64_t kShares = 32;  // a range is at most such a part of what is left
 
@@ -50,7 +49,8 @@ void GivingLoops::run(const SharedLoop& loop, Threads& threads) {
     done = start_here(loop, threads, cuts);
     for (std::size_t k = 0; k + 1 < cuts.size(); ++k) ranges.push_back({loop_, cuts[k], cuts[k + 1]});
     if (!ranges.empty()) {
-      journal_->flush();
+      if (!keep_journal([](GrowingFile& journal) { journal.flush(); }))
+        return compute_items(loop, done, loop.items, done, threads);
       link_.tell(WorkerShare{loop_, loop.name, journal_->bytes(), std::move(cuts)});
     }
   } else {
@@ -58,18 +58,22 @@ void GivingLoops::run(const SharedLoop& loop, Threads& threads) {
     compute_items(loop, 0, done, 0, threads);
   }
   if (!ranges.empty()) join(loop, ranges, done, threads);
-  note(loop);
+  keep_journal([&](GrowingFile& journal) { write_record(journal, loop, {loop_, 0, loop.items}); });
+  ++loop_;
   left_ = Clock::now();
 }
 
-void GivingLoops::note(const SharedLoop& loop) {
+/// False when there is no room for it: nothing is given away any more.
+bool GivingLoops::keep_journal(const std::function<void(GrowingFile&)>& write) {
   try {
-    write_record(*journal_, loop, {loop_++, 0, loop.items});
-    if (journal_->bytes() > kMostJournal) journal_.reset();
+    write(*journal_);
+    if (journal_->bytes() <= kMostJournal) return true;
   } catch (const std::system_error&) {
-    journal_.reset();
   }
-  if (!journal_) std::filesystem::resize_file(folder_ + "/journal", 0);
+  journal_.reset();
+  std::error_code none;
+  std::filesystem::resize_file(folder_ + "/journal", 0, none);
+  return false;
 }
 
 /// Ranges that an earlier worker gave away, if they end this loop.
@@ -125,11 +129,7 @@ void GivingLoops::join(const SharedLoop& loop, const std::vector<LoopRange>& ran
     const auto [number, first, last] = reply.range;
     if (reply.file.empty()) {
       compute_items(loop, first, last, done, threads);
-      const std::string file = "range." + std::to_string(number) + "." + std::to_string(first);
-      GrowingFile made(folder_ + "/" + file);
-      write_record(made, loop, {number, first, last});
-      made.flush();
-      link_.tell(WorkerMade{reply.range, file});
+      link_.tell(WorkerMade{reply.range, store_range(loop, reply.range)});
     } else {
       auto file = FileBytes::map(reply.file, "range");
       if (!file) throw ForeignLoop();
@@ -139,6 +139,22 @@ void GivingLoops::join(const SharedLoop& loop, const std::vector<LoopRange>& ran
     done += last - first;
     if (loop.progress) loop.progress(done, loop.items);
     threads.check();
+  }
+}
+
+/// For a successor. Its name; empty when there is no room for it.
+std::string GivingLoops::store_range(const SharedLoop& loop, const LoopRange& range) {
+  std::string name = "range." + std::to_string(stored_++);
+  const std::string file = folder_ + "/" + name;
+  try {
+    GrowingFile made(file);
+    write_record(made, loop, {range.loop, range.first, range.last});
+    made.flush();
+    return name;
+  } catch (const std::system_error&) {
+    std::error_code none;
+    std::filesystem::remove(file, none);
+    return "";
   }
 }
 
@@ -152,7 +168,7 @@ void GivingLoops::begin_pass() {
   }
   loop_ = first_pass_->loop;
   between_s_ = first_pass_->between_s;
-  journal_->shrink(first_pass_->bytes);
+  keep_journal([&](GrowingFile& journal) { journal.shrink(first_pass_->bytes); });
   known_.clear();  // of an earlier pass
 }
 

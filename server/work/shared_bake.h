@@ -44,7 +44,8 @@ class GivingLoops final : public LoopShares {
   void join(const SharedLoop&, const std::vector<LoopRange>&, std::size_t done, Threads&);
   std::vector<LoopRange> known_of_loop(const SharedLoop&);
   double least_seconds() const;
-  void note(const SharedLoop&);
+  bool keep_journal(const std::function<void(GrowingFile&)>& write);
+  std::string store_range(const SharedLoop&, const LoopRange&);
 
   const Sharing sharing_;
   std::vector<LoopRange> known_;
@@ -52,6 +53,7 @@ class GivingLoops final : public LoopShares {
   const SupervisorLink link_;
   std::optional<GrowingFile> journal_;  // nothing: no loop is given away any more
   std::uint64_t loop_ = 0;
+  int stored_ = 0;                         // ranges that were computed here, of all passes
   Clock::time_point left_ = Clock::now();  // the last loop, or the start
   double between_s_ = 0;                   // loops, since the start of the pass and before the first one
   struct Mark {

@@ -81,6 +81,7 @@ Result<std::optional<Claim>> Supervisor::claim() {
   Taker taker{.maker = maker_};
   {
     const std::lock_guard lock(mutex_);
+    if (stopping_) return std::nullopt;  // others may have waited for a store that does not answer
     taker.idle = taken_ == 0;
     taker.free_mb = means_.memory_mb - std::min(means_.memory_mb, taken_mb_);
   }
@@ -111,7 +112,7 @@ void Supervisor::run(const Claim& claim) {
     run_job(claim, *signal, place_);
   } catch (const std::exception&) {  // a fault of ours ends the job, never the server
     static_cast<void>(place_.store.fail(claim.ref, {{"internal", "the server failed to run the job", ""}, 500}));
-    ++place_.counters.failed;
+    if (!claim.job.part) ++place_.counters.failed;
     place_.bus.announce();
   }
   const std::lock_guard lock(mutex_);

@@ -23,6 +23,7 @@ namespace kiln {
 
 inline constexpr const char* kWorkerWord = "bake-worker";  // argv[1] of a worker; argv[2] is its folder
 inline constexpr int kWorkerPipe = 3;
+inline constexpr std::uint64_t kMostJournal = 4ULL << 30;  // bytes: a longer one ends the sharing of its bake
 
 enum WorkerExit : int { kExitDone = 0, kExitRefused = 65, kExitInternal = 70, kExitCanceled = 75 };
 
@@ -79,7 +80,7 @@ struct WorkerNext {
 };
 struct WorkerMade {
   LoopRange range;
-  std::string file;  // in out/
+  std::string file;  // in out/; empty: it could not be written
 };
 using WorkerLine = std::variant<ProgressEvent, WorkerArtifact, WorkerCheckpoint, WorkerShare, WorkerNext, WorkerMade,
                                 Fault, WorkerDone>;

@@ -99,9 +99,9 @@ class FleetTest : public ::testing::Test {
     while (node.workers().empty() && Clock::now() < deadline) std::this_thread::sleep_for(5ms);
     ASSERT_FALSE(node.workers().empty()) << "nobody bakes";
   }
-  static json wait_end(const Daemon& node, const std::string& id) {
+  static json wait_end(const Daemon& node, const std::string& id, std::chrono::seconds patience = 90s) {
     json now = job(node, id, 1);
-    for (const auto deadline = Clock::now() + 90s; Clock::now() < deadline; now = job(node, id, 5)) {
+    for (const auto deadline = Clock::now() + patience; Clock::now() < deadline; now = job(node, id, 5)) {
       if (now["status"] != "queued" && now["status"] != "running") break;
     }
     return now;

@@ -94,6 +94,38 @@ TEST_F(SharedBakeFleet, ItsBytesAreThoseOfASingleMachine) {
   }
 }
 
+/// Loops are numbered anew in each pass, and journal, ranges and checkpoint go on from pass to pass.
+TEST_F(SharedBakeFleet, APromiseOfSeveralPassesHasTheBytesOfASingleMachine) {
+  const auto promise = [](const std::string& scene, bool force) {
+    json document = heavy_job(scene, {{"do", "prt"}, {"order", 6}});
+    document.erase("certificate");
+    document["quality"] = {{"target_error", 0.05}};
+    document["force"] = force;
+    return document.dump();
+  };
+  const Daemon& alone = start("alone", 1, {"--share-s", "0"});
+  const std::string scene = upload(alone, pit_glb(8));
+  const json plain = wait_end(alone, submit(alone, promise(scene, false)), 240s);
+  expect_sound(alone, plain);
+  nodes_.clear();
+
+  for (const char* name : {"w1", "w2", "w3"}) start(name, 1, {"--share-s", "0.05", "--share-repeats", "0"});
+  const Daemon& door = *nodes_["w1"];
+  const std::string id = submit(door, promise(scene, true));
+  const json shared = wait_end(door, id, 240s);
+  expect_sound(door, shared);
+  EXPECT_EQ(hashes_of(shared), hashes_of(plain));
+  EXPECT_EQ(shared["attempt"], 1);
+  EXPECT_GE(sum("parts_total"), 1);
+  std::size_t passes = 0;
+  for (const json& file : shared["artifacts"]) {
+    if (file["name"] == "report.json")
+      passes = json::parse(http_get(door.port(), file["url"]).body)["promise"]["passes"].size();
+  }
+  EXPECT_GE(passes, 2U) << "too easy: it shows nothing of a second pass";
+  std::printf("{\"passes\":%zu,\"ranges_of_others\":%.0f}\n", passes, sum("parts_total"));
+}
+
 TEST_F(SharedBakeFleet, ALostWorkerCostsItsRangeAlone) {
   const Daemon& alone = start("alone", 1, {"--share-s", "0"});
   const std::string scene = upload(alone, pit_glb(16));

@@ -83,7 +83,7 @@ class BrokenStore final : public JobStore {
     return store_->add_parts(parent, parts);
   }
   Result<std::vector<PartState>> parts(const std::string& parent) override { return store_->parts(parent); }
-  Result<void> forget_parts(const std::string& parent) override {
+  Result<void> forget_parts(const ClaimRef& parent) override {
     return flaw_ == Flaw::lasting_parts ? Result<void>{} : store_->forget_parts(parent);
   }
   Result<std::optional<Claim>> claim_part(const std::string& id, Millis lease) override {

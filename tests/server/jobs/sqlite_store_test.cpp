@@ -40,14 +40,16 @@ class SqliteStoreTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-Job finished_job(JobStore& store) {
+Job queued_job(JobStore& store, const std::string& recipe) {
   EXPECT_TRUE(store.touch_blob(std::string(64, 'a'), 1));
   NewJob job;
   job.inputs.scene = {"scene.glb", std::string(64, 'a')};
   job.content_key = "key";
-  const Job made = store.create(job).value().job;
-  return store.cancel(made.id).value();
+  job.recipe = recipe;
+  return store.create(job).value().job;
 }
+
+Job finished_job(JobStore& store) { return store.cancel(queued_job(store, "{}").id).value(); }
 
 TEST_F(SqliteStoreTest, TheLogIsWrittenAhead) {
   const auto store = open_sqlite_store({file(), {}}).value();
@@ -72,9 +74,11 @@ TEST_F(SqliteStoreTest, ADatabaseOfVersionThreeIsBroughtToTheNextWithAllItHolds)
   {
     const auto store = open_sqlite_store({file(), {}}).value();
     id = finished_job(*store).id;
+    queued_job(*store, R"({"limits":{"memory_mb":512}})");
   }
   ASSERT_EQ(run(kToVersionThree), SQLITE_OK);
   const auto store = open_sqlite_store({file(), {}}).value();
+  EXPECT_EQ(store->claim(Millis(60'000), {}).value()->job.memory_mb, 512U) << "that it declared before anybody asked";
   EXPECT_EQ(store->get(id)->state, JobState::canceled);
   EXPECT_FALSE(store->get(id)->part);
   EXPECT_TRUE(store->parts(id).value().empty());

@@ -21,11 +21,12 @@ TEST_P(StoreClaims, PartsAreJobsWithTheInputsOfTheirs) {
   EXPECT_EQ(part.job.inputs.scene, parent.job.inputs.scene);
   EXPECT_EQ(part.job.recipe, parent.job.recipe);
   EXPECT_EQ(part.job.tenant, parent.job.tenant);
-  EXPECT_EQ(store().commit(part.ref, std::vector{artifact("range")}, false), Wrote::done);
+  EXPECT_EQ(store().commit(part.ref, std::vector{artifact("log.txt"), artifact("range")}, false), Wrote::done);
 
   const auto parts = store().parts(parent.ref.job_id).value();
   ASSERT_EQ(parts.size(), 2U);
   EXPECT_EQ(parts[0].order, "first");
+  EXPECT_EQ(parts[0].maker, "engine cpu");
   EXPECT_EQ(parts[0].state, JobState::succeeded);
   EXPECT_EQ(parts[0].sha256, artifact("range").sha256);
   EXPECT_EQ(parts[1].order, "second");
@@ -99,7 +100,9 @@ TEST_P(StoreClaims, PartsOutliveAWorkerOfTheirJob) {
   const Claim again = claim();
   EXPECT_EQ(again.ref.job_id, lost.ref.job_id);
   EXPECT_EQ(store().parts(lost.ref.job_id).value().size(), 2U);
-  EXPECT_TRUE(store().forget_parts(lost.ref.job_id));
+  EXPECT_TRUE(store().forget_parts(lost.ref));
+  EXPECT_EQ(store().parts(lost.ref.job_id).value().size(), 2U) << "they are of use to the one who has the job now";
+  EXPECT_TRUE(store().forget_parts(again.ref));
   EXPECT_TRUE(store().parts(lost.ref.job_id).value().empty());
 }
 
@@ -125,7 +128,7 @@ TEST_P(StoreClaims, TheJournalOfAPartIsKept) {
   store().add_parts(parent.ref, two_parts(sha('d'))).value();
   clock_.now_ms += 1000;
   EXPECT_TRUE(store().forget_unused_blobs(Millis(500)).value().empty());
-  EXPECT_TRUE(store().forget_parts(parent.ref.job_id));
+  EXPECT_TRUE(store().forget_parts(parent.ref));
   EXPECT_EQ(store().forget_unused_blobs(Millis(500)).value(), std::vector{sha('d')});
 }
 
@@ -143,6 +146,26 @@ TEST_P(StoreClaims, AJobWaitsForMemoryAndSmallerOnesPassItForAWhile) {
   busy.free_mb = 4096;
   EXPECT_EQ(store().claim(kTestLease, busy).value().value().job.label, "big");
   EXPECT_EQ(store().claim(kTestLease, busy).value().value().job.label, "small");
+}
+
+TEST_P(StoreClaims, APartThatHasNoRoomHoldsUpNobody) {
+  NewJob big = job("big"), small = job("small");
+  big.memory_mb = 4096;
+  small.memory_mb = 512;
+  big.tenant = "a";
+  small.tenant = "b";
+  for (const char* tenant : {"a", "b"}) EXPECT_TRUE(store().touch_blob(big.inputs.scene.sha256, 1, tenant));
+  store().create(big).value();
+  const Claim parent = claim();
+  store().add_parts(parent.ref, two_parts(sha('d'))).value();
+  for (int i = 0; i < 3; ++i) store().create(small).value();
+  const Taker busy{.maker = "engine cpu", .free_mb = 1024, .idle = false};
+  for (int i = 0; i < 3; ++i) {
+    const auto next = store().claim(kTestLease, busy).value();
+    ASSERT_TRUE(next) << "job " << i << ": its tenant has more at work than that of the part";
+    EXPECT_EQ(next->job.label, "small");
+    clock_.now_ms += 30'001;
+  }
 }
 
 TEST_P(StoreClaims, AnIdleServerTakesAJobThatIsTooLargeForIt) {

@@ -271,6 +271,17 @@ TEST_F(ServiceTest, JobsWaitForTheMemoryThatTheyDeclare) {
   for (const std::string& id : {second, third}) service_->cancel(id).value();
 }
 
+TEST_F(ServiceTest, RangesOfABakeAreComputedByTheOtherWorkerAndNobodyHearsOfThem) {
+  options_.workers = 2;
+  start();
+  const auto stream = service_->subscribe("", {}).value();
+  const Job job = finish("share");
+  EXPECT_EQ(job.state, JobState::succeeded);
+  EXPECT_NE(text_of(service_->open_artifact(job.id, "log.txt")->reader), "0") << "the other worker took nothing";
+  EXPECT_GE(service_->stats().parts, 1U);
+  while (const auto event = stream->next(0ms)) EXPECT_EQ(event->job_id, job.id);
+}
+
 TEST_F(ServiceTest, TwoWorkersRunTwoJobsAtATime) {
   options_.workers = 2;
   start();

@@ -3,7 +3,10 @@
 #include "server/work/shared_bake.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -82,8 +85,9 @@ class SharedBake : public ::testing::Test {
 
   using Answer = std::function<RangeReply(std::deque<LoopRange>& left)>;
 
-  /// A bake that gives ranges of its second loop away; `answer` says what to do with those that are left.
-  std::vector<double> give(const Answer& answer, const std::vector<LoopRange>& known = {}) {
+  /// A bake that gives ranges of its second loop away, in so many passes; `answer` says what to do with those that are
+  /// left.
+  std::vector<double> give(const Answer& answer, const std::vector<LoopRange>& known = {}, int passes = 0) {
     shared_.reset();
     std::filesystem::remove_all(folder_ / "giver");
     std::filesystem::create_directory(folder_ / "giver");
@@ -91,6 +95,7 @@ class SharedBake : public ::testing::Test {
     Threads threads(1);
     GivingLoops loops({.least_s = 0.02, .repeats = 0}, known, (folder_ / "giver").string(),
                       {[&](const WorkerLine& line) {
+                         if (const auto* made = std::get_if<WorkerMade>(&line)) made_.push_back(made->file);
                          const auto* share = std::get_if<WorkerShare>(&line);
                          if (share == nullptr) return;
                          shared_ = *share;
@@ -105,6 +110,11 @@ class SharedBake : public ::testing::Test {
                        }});
     threads.share_with(&loops);
     ToyBake bake{.pause = 1ms};
+    for (int pass = 1; pass < passes; ++pass) {
+      loops.begin_pass();
+      EXPECT_EQ(bake.run(threads), plain_);
+    }
+    if (passes > 0) loops.begin_pass();
     auto result = bake.run(threads);
     computed_ = bake.computed;
     return result;
@@ -120,6 +130,7 @@ class SharedBake : public ::testing::Test {
   Threads threads_{2};
   std::vector<double> plain_;
   std::optional<WorkerShare> shared_;
+  std::vector<std::string> made_;  // files of ranges
   std::size_t computed_ = 0;
   int files_ = 0;
 };
@@ -171,6 +182,39 @@ TEST_F(SharedBake, ASuccessorTakesUpWhatWasGivenAway) {
   EXPECT_EQ(result, plain_);
   EXPECT_FALSE(shared_) << "the ranges were known";
   EXPECT_EQ(computed_, (given.front().first + 3) / 4);
+}
+
+/// Ranges of each pass have the same numbers, and may begin at the same item.
+TEST_F(SharedBake, EachRangeHasAFileOfItsOwnInAllPasses) {
+  const auto result = give([&](std::deque<LoopRange>& left) { return RangeReply{pop(left), ""}; }, {}, 3);
+  EXPECT_EQ(result, plain_);
+  EXPECT_GE(made_.size(), 6U);
+  std::ranges::sort(made_);
+  EXPECT_EQ(std::ranges::adjacent_find(made_), made_.end()) << "what is written twice cannot be written";
+}
+
+TEST_F(SharedBake, ARangeThatCannotBeWrittenIsComputedAllTheSame) {
+  std::string in_the_way;
+  const auto result = give([&](std::deque<LoopRange>& left) {
+    if (in_the_way.empty()) std::filesystem::create_directory(in_the_way = folder_ / "giver" / "range.0");
+    return RangeReply{pop(left), ""};
+  });
+  EXPECT_EQ(result, plain_);
+  ASSERT_GE(made_.size(), 2U);
+  EXPECT_EQ(made_[0], "");
+  EXPECT_NE(made_[1], "");
+}
+
+TEST_F(SharedBake, WithoutRoomForItsJournalABakeSharesNothing) {
+  ::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{}, none{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  none.rlim_max = before.rlim_max;
+  ::setrlimit(RLIMIT_FSIZE, &none);
+  const auto result = give([](std::deque<LoopRange>& left) { return RangeReply{pop(left), ""}; });
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(result, plain_);
+  EXPECT_FALSE(shared_);
 }
 
 TEST_F(SharedBake, WhatIsOfAnotherBakeIsRefused) {
