@@ -53,7 +53,8 @@ struct JobError {
   int status = 500;
 };
 
-/// A range of a loop of another job, for whoever has time (server/work/part_desk.h). It ends with that job, if not before.
+/// A range of a loop of another job, for whoever has time (server/work/part_desk.h). It ends with that job, if not
+/// before.
 struct JobPart {
   std::string parent;   // that job's id
   std::string order;    // what to compute, JSON
