@@ -120,8 +120,9 @@ std::string promise_text(std::string_view report) {
   if (!document.contains("error_sources")) return out;
   const json& sources = document["error_sources"];
   out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + " (of reflections " +
-         percent_text(number_of(sources, "noise_of_reflections")) + "), interpolation " +
-         percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
+         percent_text(number_of(sources, "noise_of_reflections")) + "), " +
+         (sources.contains("points") ? "points " + percent_text(number_of(sources, "points")) + ", " : "") +
+         "interpolation " + percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
          percent_text(number_of(sources, "bounce_tail")) + ", quantisation " +
          percent_text(number_of(sources, "quantisation")) + ", compression " +
          percent_text(number_of(sources, "compression"));

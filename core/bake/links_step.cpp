@@ -63,7 +63,7 @@ void add_prediction(Plan& plan, const Scene& scene) {
 
 Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const TransportStep& step = *recipe.transport;
-  Plan plan = make_radiosity_plan(scene, step.surface, recipe.quality, sky, threads);
+  Plan plan = make_radiosity_plan(scene, step.surface, radiosity_effort(recipe.quality), sky, threads);
   const LinksEffort effort = links_effort(recipe.quality);
   LinkParams& l = plan.links.emplace();
   l.rays = step.surface.rays.value_or(effort.rays);

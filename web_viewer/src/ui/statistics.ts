@@ -64,6 +64,7 @@ const withInterval = (c: { relrmse: number; interval?: [number, number] }): stri
 const kSources: readonly (readonly [string, string])[] = [
   ['noise', 'Error from noise'],
   ['noise_of_reflections', 'of reflected light'],
+  ['points', 'from points around vertices'],
   ['interpolation', 'from interpolation'],
   ['bounce_tail', 'from bounces left out'],
   ['quantisation', 'from quantisation'],
