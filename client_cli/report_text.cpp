@@ -106,6 +106,10 @@ std::string certificate_text(std::string_view report) {
     out += "\ntowards eyes, " + text_of(level, "file") + " (" + count(number_of(level, "triangles")) +
            " triangles): " + error_text(level["certificate"]);
   }
+  if (const json links = certificate_of(document, "links"); links.is_object() && links.contains("of_rms")) {
+    out += "\nof what lamps reflect, at " + count(number_of(links, "points")) +
+           " points: " + percent_text(number_of(links, "of_rms")) + " of its root mean square";
+  }
   if (const json grid = certificate_of(document, "grid"); grid.is_object())
     out += "\nof the grid, at " + count(number_of(grid, "points")) + " points of the surface: " + error_text(grid);
   return out;

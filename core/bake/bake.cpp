@@ -240,6 +240,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     log.begin("read links", 0.93);
     KILN_TRY(outcome, links->finish(glb, decoded, input.recipe, threads));
     pass.links = std::move(outcome);
+    pass.bounce_rays += pass.links->stats.rays;
     streams.push_back({"links", pass.links->bytes});
   }
   if (input.recipe.certificate) log.begin("certificate", 1.0);
@@ -285,6 +286,8 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
   PassRecord out;
   if (pass.field) {
     out = field_record(*pass.field);
+  } else if (pass.links) {
+    out = links_record(*pass.links, pass.plan, pass.decoded.scene.mesh);
   } else {
     const ErrorStats& error = pass.certificate->transport;
     out = {.order = pass.plan.order,
@@ -304,7 +307,7 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
       out.own_high = pass.certificate->job_light->interval_high;
     }
   }
-  if (pass.plan.radiosity && !pass.field) {
+  if (pass.plan.radiosity && !pass.field && !pass.links) {
     out.samples = pass.plan.radiosity->direct.sky, out.bounce_samples = pass.plan.radiosity->rays;
     out.points = pass.points, out.gathered = pass.gathered;
   }

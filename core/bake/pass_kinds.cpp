@@ -20,8 +20,18 @@ PassKind radiosity_passes() {
           .last_knob = "a higher /steps/0/subdivide/max_depth may"};
 }
 
+PassKind links_passes() {
+  return {.gather_ray = 4,
+          .triangle = 300,
+          .rays = "/steps/0/rays",
+          .point = 2000,
+          .points_power = 0.5,
+          .last_knob = "a lamp near a surface makes a spot that is smaller than the cells of 48000 senders"};
+}
+
 PassKind passes_of(const Recipe& recipe) {
   if (recipe.light_field) return light_field_passes();
+  if (recipe.transport) return links_passes();
   return recipe.radiosity ? radiosity_passes() : PassKind{};
 }
 
@@ -35,9 +45,10 @@ FixedKnobs fixed_knobs(const Recipe& recipe) {
     out.order = step.degree.has_value();
     out.direct = out.reflected = step.rays.has_value();
     out.triangles = fixed(step.surface.subdivide);
-  } else if (recipe.radiosity) {
-    const RadiosityStep& step = *recipe.radiosity;
+  } else if (recipe.radiosity || recipe.transport) {
+    const RadiosityStep& step = recipe.radiosity ? *recipe.radiosity : recipe.transport->surface;
     out.order = true;
+    out.direct = recipe.transport.has_value();  // what links bring has none
     out.reflected = step.rays.has_value();
     out.points = step.radius.has_value(), out.eps = step.eps_irradiance.has_value();
     out.triangles = fixed(step.subdivide);

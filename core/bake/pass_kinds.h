@@ -18,6 +18,9 @@ struct PassKind {
 PassKind light_field_passes();
 /// Of radiosity `samples` of a record are the sky's rays at a vertex, `bounce_samples` the rays of a gather.
 PassKind radiosity_passes();
+/// Of transport `samples` are the same, `bounce_samples` the rays of a row, `points` and `gathered` senders and
+/// receivers.
+PassKind links_passes();
 PassKind passes_of(const Recipe&);
 
 /// Which of its knobs the recipe fixes.

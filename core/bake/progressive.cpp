@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/bake/light_field_step.h"
+#include "core/bake/links_step.h"
 #include "core/bake/radiosity_step.h"
 
 namespace kiln {
@@ -41,6 +42,7 @@ double work(const PassRecord& pass) { return std::max(1e-3, pass.seconds - pass.
 
 bool is_of(const PassRecord& record, const Plan& plan) {
   if (plan.field) return record.order == plan.field->outgoing.degree && record.samples == plan.field->outgoing.rays;
+  if (plan.links) return record.samples == plan.radiosity->direct.sky && record.bounce_samples == plan.links->rays;
   if (plan.radiosity)
     return record.samples == plan.radiosity->direct.sky && record.bounce_samples == plan.radiosity->rays;
   return record.order == plan.order && record.samples == plan.samples && record.bounce_samples == plan.bounce_samples;
@@ -235,6 +237,8 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   }
   if (plan.field)
     predict_grown_field(plan, growth.triangles);
+  else if (plan.links)
+    grow_links(plan, {growth.reflected, growth.reflected, growth.points, fixed_.eps, pass_reason()}, scene);
   else if (plan.radiosity)
     grow_radiosity(plan, {growth.direct, growth.reflected, growth.points, fixed_.eps, pass_reason()}, scene);
   else

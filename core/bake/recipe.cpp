@@ -328,10 +328,7 @@ void check_points_promise(const RadiosityStep& step, Errors& errors) {
 void check_promise(const Recipe& recipe, Errors& errors) {
   if (!recipe.promise) return;
   if (recipe.radiosity) check_points_promise(*recipe.radiosity, errors);
-  if (recipe.transport) {
-    errors.push_back(
-        {"/quality", "cannot be promised of a transport step: it is baked in one pass", "", "draft, standard, final"});
-  }
+  if (recipe.transport) check_points_promise(recipe.transport->surface, errors);
   if (recipe.light_field) check_field_promise(recipe, errors);
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",

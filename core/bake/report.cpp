@@ -131,16 +131,24 @@ ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
   return out;
 }
 
+ordered_json links_sources(const LinkSources& s) {
+  return {{"noise", s.noise}, {"links", s.links}, {"senders", s.senders}, {"interpolation", s.interpolation}};
+}
+
 ordered_json links_certificate_object(const std::optional<LinksCertificate>& certificate) {
   if (!certificate) return nullptr;
   ordered_json out = error_object(certificate->error);
-  out["of_rms"] = certificate->of_rms;
+  const ErrorStats& rms = certificate->of_rms;
+  out["of_rms"] = rms.relrmse;
+  out["of_rms_interval"] = {rms.interval_low, rms.interval_high};
+  out["sources"] = links_sources(certificate->sources);
   out["lamps"] = ordered_json::array();
   for (std::size_t k = 0; k < certificate->lamps.size(); ++k) {
     const Vec3d& at = certificate->lamps[k];
     out["lamps"].push_back(
         {{"place", {at.x, at.y, at.z}},
          {"relrmse", k < certificate->error.by_lighting.size() ? certificate->error.by_lighting[k] : 0},
+         {"of_rms", k < rms.by_lighting.size() ? rms.by_lighting[k] : 0},
          {"mean_light", certificate->mean_light[k]}});
   }
   out["dark"] = certificate->dark;
@@ -347,6 +355,25 @@ ordered_json field_pass_list(const Passes& passes) {
   return list;
 }
 
+ordered_json links_pass_list(const Passes& passes) {
+  ordered_json list = ordered_json::array();
+  for (const PassRecord& p : passes.all()) {
+    const ErrorSources& s = p.sources;
+    list.push_back(
+        {{"rays_of_a_row", p.bounce_samples},
+         {"senders", p.points},
+         {"receivers", p.gathered},
+         {"triangles", p.triangles},
+         {"vertices", p.vertices},
+         {"rays", p.rays},
+         {"seconds", p.seconds},
+         {"of_rms", p.relrmse},
+         {"interval", {p.low, p.high}},
+         {"sources", {{"noise", s.noise}, {"senders_and_links", s.points}, {"interpolation", s.interpolation}}}});
+  }
+  return list;
+}
+
 ordered_json promise_object(const ReportInput& in) {
   const Promise& promise = in.recipe.promise;
   const Passes& passes = in.passes;
@@ -357,7 +384,7 @@ ordered_json promise_object(const ReportInput& in) {
   out["kept"] = passes.kept();
   out["ended_by"] = kEndings[static_cast<int>(passes.outlook().ending)];
   out["reason"] = passes.outlook().reason;
-  out["passes"] = in.field ? field_pass_list(passes) : pass_list(passes, in.plan);
+  out["passes"] = in.field ? field_pass_list(passes) : in.links ? links_pass_list(passes) : pass_list(passes, in.plan);
   return out;
 }
 
