@@ -97,7 +97,7 @@ class PrimitiveBuilder {
                        return std::array{n.x, n.y, n.z};
                      })});
     add_texcoords(0, part_.has_uv0 ? &mesh_.uv0 : nullptr, e.texcoord_bits);
-    add_texcoords(1, part_.has_uv1 ? &mesh_.uv1 : nullptr, e.texcoord_bits);
+    add_texcoords(1, part_.has_uv1 ? &mesh_.uv1 : nullptr, e.lightmap_bits);
     if (part_.has_tangent) {
       add({"TANGENT"}, {StreamKind::generic, 4, kTangentBits, {-1, -1, -1, -1}, 2, gather<4>(vertices_, [&](auto v) {
                           const Vec4f& t = mesh_.tangent[v];
