@@ -34,6 +34,9 @@ struct MoreLight {
 struct RadiosityHooks {
   OnLit lit = {};
   MoreLight more = {};
+  std::vector<TransferPoint> places = {};                                              // besides the vertices,
+  std::function<void(std::vector<Vec3f>)> lit_places = {};                             // told their light
+  std::function<void(const PointHierarchy&, std::span<const Vec3f>)> lit_points = {};  // told the light of the points
 };
 
 /// Refines scene.mesh as planned and solves for the light at its vertices. Adds to plan.decisions what it found.
