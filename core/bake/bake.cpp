@@ -179,7 +179,7 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   std::optional<FinishSource> finish;
   if (beside.lightmap != nullptr) {
     hooks.places = beside.lightmap->places();
-    hooks.lit_places = [&](const std::vector<Vec3f>& value) { beside.lightmap->light(value); };
+    hooks.lit_places = [&](const LitPlaces& lit) { beside.lightmap->light(lit, threads); };
   }
   if (beside.points != nullptr) {
     hooks.lit_points = [&](const PointHierarchy& points, std::span<const Vec3f> value) {

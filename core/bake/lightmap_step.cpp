@@ -16,6 +16,8 @@ constexpr double kTexelsAVertex = 4;  // for about the error of the vertices (RE
 constexpr double kPackedFill = 0.7;   // of the picture that packed charts are taken to cover
 constexpr int kSideStep = 64, kLeastSide = 64, kMostSide = 8192;
 constexpr std::size_t kBlock = 256;
+constexpr float kEdge = 0.25F;  // of the brighter of two texels and of the mean: a jump of direct light
+constexpr int kParts = 4;       // along a side of a texel at a jump
 
 std::string percent(double share) { return short_text(100 * share) + " %"; }
 
@@ -115,6 +117,15 @@ void warn_of_map(const TexelMap& map, const Coordinates& found, Plan& plan) {
          percent(found.flat) + " of the surface has no area in TEXCOORD_1: it shows the light of a line or a dot.");
 }
 
+/// As vertex_point: leaning to the middle of its face.
+TransferPoint place_on(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
+  const Triangle& t = mesh.triangles[triangle];
+  const float w = 1 - u - v;
+  const auto mix = [&](const std::vector<Vec3f>& x) { return x[t[0]] * w + x[t[1]] * u + x[t[2]] * v; };
+  const Vec3f normal = normalized(mix(mesh.normal), mesh.normal[t[0]]);
+  return {mix(mesh.position), normal, centroid(mesh, t), normalized(area_vector(mesh, t), normal)};
+}
+
 constexpr double kPixelBytes = 110;  // while a picture is laid out, filled, written and read back
 
 /// Before anything of its size is made.
@@ -200,8 +211,8 @@ Result<void> plan_lightmap(const Scene& scene, const Recipe& recipe, Plan& plan)
   return {};
 }
 
-LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& threads) {
-  const Mesh& mesh = scene.mesh;
+LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& threads) : surface_(scene.mesh) {
+  const Mesh& mesh = surface_;
   const LightmapPlan& p = *plan.lightmap;
   charts_ = find_uv_charts(mesh, shown_triangles(mesh, p.parts));
   map_ = map_texels(mesh, charts_, p.side);
@@ -220,12 +231,7 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
   threads.for_blocks(all.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const TexelPlace& at = map_.places[i];
-      const Triangle& t = mesh.triangles[at.triangle];
-      const float w = 1 - at.u - at.v;
-      const auto mix = [&](const std::vector<Vec3f>& x) { return x[t[0]] * w + x[t[1]] * at.u + x[t[2]] * at.v; };
-      const Vec3f position = mix(mesh.position), face = area_vector(mesh, t);
-      const Vec3f normal = normalized(mix(mesh.normal), mesh.normal[t[0]]);
-      all[i] = {position, normal, centroid(mesh, t), normalized(face, normal)};
+      all[i] = place_on(mesh, at.triangle, at.u, at.v);
       seen[i] = hidden(all[i]) ? 0 : 1;
     }
   });
@@ -233,17 +239,90 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
     if (seen[i] == 0) continue;
     places_.push_back(all[i]);
     look_.push_back(part_look(scene, scene.parts[mesh.part[map_.places[i].triangle]]));
-    texel_of_.push_back(map_.places[i].texel);
+    of_map_.push_back(static_cast<std::uint32_t>(i));
   }
 }
 
-void LightmapStep::light(const std::vector<Vec3f>& of_places) {
+/// Places all over texel `place`, as far as its own triangle reaches.
+void LightmapStep::add_parts(std::size_t place, std::vector<TransferPoint>& out) const {
+  const TexelPlace& at = map_.places[of_map_[place]];
+  std::array<Vec2d, 3> c;  // in texels
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2f& uv = surface_.uv1[surface_.triangles[at.triangle][k]];
+    c[k] = {double{uv.x} * map_.side, double{uv.y} * map_.side};
+  }
+  const Vec2d e1 = c[1] - c[0], e2 = c[2] - c[0];
+  const double twice = cross(e1, e2);
+  if (twice == 0) return;
+  for (int part = 0; part < kParts * kParts; ++part) {
+    const Vec2d off{(part % kParts + 0.5) / kParts - 0.5, (part / kParts + 0.5) / kParts - 0.5};
+    const double u = double{at.u} + cross(off, e2) / twice, v = double{at.v} + cross(e1, off) / twice;
+    if (u >= 0 && v >= 0 && u + v <= 1)
+      out.push_back(place_on(surface_, at.triangle, static_cast<float>(u), static_cast<float>(v)));
+  }
+}
+
+std::vector<Vec3f> LightmapStep::softened(const LitPlaces& lit, Threads& threads) const {
+  std::vector<Vec3f> out(lit.direct.begin(), lit.direct.end());
+  const auto largest = [](const Vec3f& x) { return std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}); };
+  double mean = 0;
+  for (const Vec3f& x : out) mean += double{largest(x)} / static_cast<double>(out.size());
+  const std::vector<char> edge = edges([&](std::size_t a, std::size_t b) {
+    const float apart = largest(lit.direct[a] - lit.direct[b]);
+    return apart > kEdge * std::max({largest(lit.direct[a]), largest(lit.direct[b]), static_cast<float>(mean)});
+  });
+  std::vector<TransferPoint> parts;
+  std::vector<std::uint32_t> of;  // the place of each
+  for (std::size_t i = 0; i < edge.size(); ++i) {
+    if (edge[i] != 0) add_parts(i, parts);
+    of.resize(parts.size(), static_cast<std::uint32_t>(i));
+  }
+  const std::vector<Vec3f> light = lit.direct_at(parts);
+  const HiddenTest hidden = hidden_test(lit.tracer);
+  std::vector<char> seen(parts.size());
+  threads.for_blocks(parts.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) seen[k] = hidden(parts[k]) ? 0 : 1;
+  });
+  for (std::size_t k = 0; k < parts.size();) {
+    const std::uint32_t place = of[k];
+    Vec3f sum;
+    float count = 0;
+    for (; k < parts.size() && of[k] == place; ++k) {
+      if (seen[k] != 0) sum += light[k], count += 1;
+    }
+    if (count > 0) out[place] = sum / count;
+  }
+  return out;
+}
+
+/// Places beside which, in their own chart, one stands that `differs(a, b)` from them.
+template <class Differs>
+std::vector<char> LightmapStep::edges(const Differs& differs) const {
+  constexpr std::uint32_t kNone = 0xffffffffU;
+  const auto width = static_cast<std::size_t>(map_.side);
+  std::vector<std::uint32_t> place(width * width, kNone);
+  for (std::size_t i = 0; i < of_map_.size(); ++i) place[map_.places[of_map_[i]].texel] = static_cast<std::uint32_t>(i);
+  const auto chart = [&](std::uint32_t p) { return charts_.of[map_.places[of_map_[p]].triangle]; };
+  std::vector<char> out(of_map_.size(), 0);
+  const auto compare = [&](std::uint32_t a, std::uint32_t b) {
+    if (a != kNone && b != kNone && chart(a) == chart(b) && differs(a, b)) out[a] = out[b] = 1;
+  };
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if ((i + 1) % width != 0) compare(place[i], place[i + 1]);
+    if (i + width < place.size()) compare(place[i], place[i + width]);
+  }
+  return out;
+}
+
+void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
   const std::size_t count = static_cast<std::size_t>(map_.side) * static_cast<std::size_t>(map_.side);
+  const std::vector<Vec3f> direct = softened(lit, threads);
   lightmap_.texels.assign(count, {});
   std::vector<char> known(count, 0);
-  for (std::size_t i = 0; i < of_places.size(); ++i) {
-    lightmap_.texels[texel_of_[i]] = of_places[i];
-    known[texel_of_[i]] = 1;
+  for (std::size_t i = 0; i < direct.size(); ++i) {
+    const std::uint32_t texel = map_.places[of_map_[i]].texel;
+    lightmap_.texels[texel] = direct[i] + lit.reflected[i];
+    known[texel] = 1;
   }
   fill_texels(map_, charts_, std::move(known), lightmap_.texels);
   stitch_seams(seams_, map_, lightmap_.texels);
@@ -253,7 +332,7 @@ float LightmapStep::exposure() const {
   constexpr double kPercentile = 0.9;
   std::vector<float> bright;
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    const Vec3f c = look_[i].albedo * lightmap_.texels[texel_of_[i]] + look_[i].emission;
+    const Vec3f c = look_[i].albedo * lightmap_.texels[map_.places[of_map_[i]].texel] + look_[i].emission;
     if (const float most = std::max({c.x, c.y, c.z}); most > 0) bright.push_back(most);
   }
   if (bright.empty()) return 1;

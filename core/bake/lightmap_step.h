@@ -3,6 +3,8 @@
 //
 // Place    each texel stands at the surface that it shows (core/mesh/texel_map.h), with that place's normal, and is lit
 //          as a vertex is: direct light in full, reflected light read from the points that it sees.
+// Edges    Where direct light jumps from one texel to the next, each of the two takes the mean over its own area: a
+//          shadow has a soft step instead of teeth, as bilinear filtering wants it.
 // Filled   Texels inside solids take their light from the chart around them, those of no chart from their neighbours.
 // Seams    The two sides of a seam agree (core/mesh/texel_seams.h).
 // Layout   The author's where it is one for the whole scene, else packed anew (core/mesh/uv_charts.h). Instances are
@@ -18,6 +20,7 @@
 #include "core/bake/bake_log.h"
 #include "core/bake/lightmap_certificate.h"
 #include "core/bake/plan.h"
+#include "core/bake/radiosity_step.h"
 #include "core/bake/recipe.h"
 #include "core/mesh/texel_seams.h"
 
@@ -43,7 +46,7 @@ class LightmapStep {
 
   /// Where light is asked for.
   const std::vector<TransferPoint>& places() const { return places_; }
-  void light(const std::vector<Vec3f>& of_places);
+  void light(const LitPlaces&, Threads&);
   /// As automatic_exposure (core/artifact/look.h), over what is lit.
   float exposure() const;
 
@@ -59,11 +62,17 @@ class LightmapStep {
   Result<LightmapOutcome> finish(Bytes& glb, const Job&, BakeLog&, Threads&) const;
 
  private:
+  std::vector<Vec3f> softened(const LitPlaces&, Threads&) const;
+  template <class Differs>
+  std::vector<char> edges(const Differs&) const;
+  void add_parts(std::size_t place, std::vector<TransferPoint>&) const;
+
+  Mesh surface_;  // of the input
   UvCharts charts_;
   TexelMap map_;
   std::vector<SeamPlace> seams_;
-  std::vector<char> written_;            // parts that have a triangle
-  std::vector<std::uint32_t> texel_of_;  // of each place
+  std::vector<char> written_;          // parts that have a triangle
+  std::vector<std::uint32_t> of_map_;  // of each place: which of map_.places it is
   std::vector<TransferPoint> places_;
   std::vector<PartLook> look_;  // of each place
   double area_ = 0;             // of what is shown, square metres

@@ -221,12 +221,19 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
              (params.places.empty() ? "" : " texels and") + " vertices gather for themselves; " +
              std::to_string(r.stats.sweeps) + " sweeps");
 
-  std::vector<Vec3f> light;
-  for (std::size_t v = 0; v < r.direct.size(); ++v) light.push_back(r.direct[v] + r.indirect[v]);
-  const auto vertices = light.begin() + static_cast<std::ptrdiff_t>(scene.mesh.position.size());
+  const std::size_t vertices = scene.mesh.position.size();
   if (hooks.lit_points) hooks.lit_points(r.points, r.point_light);
-  if (hooks.lit_places) hooks.lit_places({vertices, light.end()});
-  light.erase(vertices, light.end());
+  if (hooks.lit_places) {
+    const DirectLight light(tracer, sky, params.direct);
+    std::uint64_t rays = 0;
+    hooks.lit_places(
+        {std::span(r.direct).subspan(vertices), std::span(r.indirect).subspan(vertices),
+         [&](std::span<const TransferPoint> points) { return light_at(points, light, params.seed, rays, threads); },
+         tracer});
+    log.count_rays(rays);
+  }
+  std::vector<Vec3f> light;
+  for (std::size_t v = 0; v < vertices; ++v) light.push_back(r.direct[v] + r.indirect[v]);
   if (hooks.lit) hooks.lit(tracer, r.surface.get(), light);
 
   Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};

@@ -32,7 +32,7 @@ const json = {
   scene: 0,
   scenes: [{ nodes: [0, 1] }],
   nodes: [{ mesh: 0 }, { translation: [0.3, 0.25, -0.4], extensions: { KHR_lights_punctual: { light: 0 } } }],
-  meshes: [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 1, TEXCOORD_1: 2 }, indices: 3, material: 0 }] }],
+  meshes: [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 1, TEXCOORD_0: 2, TEXCOORD_1: 2 }, indices: 3, material: 0 }] }],
   materials: [{ name: 'wall', pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1], metallicFactor: 0 } }],
   accessors: types.map((type, i) => ({
     bufferView: i,
