@@ -255,7 +255,8 @@ void LightmapStep::add_parts(std::size_t place, std::vector<TransferPoint>& out)
   const double twice = cross(e1, e2);
   if (twice == 0) return;
   for (int part = 0; part < kParts * kParts; ++part) {
-    const Vec2d off{(part % kParts + 0.5) / kParts - 0.5, (part / kParts + 0.5) / kParts - 0.5};
+    const int column = part % kParts, row = part / kParts;
+    const Vec2d off{(column + 0.5) / kParts - 0.5, (row + 0.5) / kParts - 0.5};
     const double u = double{at.u} + cross(off, e2) / twice, v = double{at.v} + cross(e1, off) / twice;
     if (u >= 0 && v >= 0 && u + v <= 1)
       out.push_back(place_on(surface_, at.triangle, static_cast<float>(u), static_cast<float>(v)));
