@@ -147,6 +147,7 @@ Outcome<json> facts_of(const std::string& path) {
     facts["light_field"] = field_facts(baked.field);
     const bool lit = !baked.field.coefficients.empty();
     facts["certificate"] = certificate_beside(path, lit ? "/lightfield/certificate" : "/certificate");
+    if (facts["certificate"].is_null()) facts["certificate"] = certificate_beside(path, "/lightmap/certificate");
     facts.update(scene_facts(baked.scene));
     facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) /
                                 static_cast<double>(std::max<std::size_t>(1, baked.scene.mesh.position.size()));

@@ -49,6 +49,22 @@ json certificate_of(const json& document, const char* step) {
   return document.contains(place) ? document[place] : json();
 }
 
+/// Of the vertices; of a lightmap alone there is none.
+std::string vertices_text(const json& certificate) {
+  if (!certificate.is_object()) return {};
+  std::string out = error_text(certificate) + ", without worst 1 % " +
+                    percent_text(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
+                    percent_text(number_of(certificate, "p99")) + ", bias " +
+                    percent_text(number_of(certificate, "bias")) + ", at " + count(number_of(certificate, "points")) +
+                    " points";
+  if (certificate.contains("seen") && certificate["seen"].is_object())
+    out += "\nwhere it can be seen (" + count(number_of(certificate["seen"], "points")) +
+           " points): " + error_text(certificate["seen"]);
+  if (certificate.contains("job_light") && certificate["job_light"].is_object())
+    out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
+  return out;
+}
+
 std::string prediction_text(const json& plan) {
   if (!plan.contains("prediction")) return {};
   const json& p = plan["prediction"];
@@ -87,19 +103,12 @@ std::string plan_text(std::string_view text) {
 std::vector<std::string> report_warnings(std::string_view report) { return warnings_of(parsed(report)); }
 
 std::string certificate_text(std::string_view report) {
-  const json document = parsed(report);
-  if (!document.contains("certificate") || !document["certificate"].is_object()) return {};
-  const json& certificate = document["certificate"];
-  std::string out = error_text(certificate) + ", without worst 1 % " +
-                    percent_text(number_of(certificate, "relrmse_without_worst_1pct")) + ", 99th percentile " +
-                    percent_text(number_of(certificate, "p99")) + ", bias " +
-                    percent_text(number_of(certificate, "bias")) + ", at " + count(number_of(certificate, "points")) +
-                    " points";
-  if (certificate.contains("seen") && certificate["seen"].is_object())
-    out += "\nwhere it can be seen (" + count(number_of(certificate["seen"], "points")) +
-           " points): " + error_text(certificate["seen"]);
-  if (certificate.contains("job_light") && certificate["job_light"].is_object())
-    out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
+  const json document = parsed(report), lightmap = certificate_of(document, "lightmap");
+  std::string out = vertices_text(document.value("certificate", json()));
+  if (lightmap.is_object())
+    out += (out.empty() ? "" : "\n") + std::string("of the lightmap, at ") + count(number_of(lightmap, "points")) +
+           " points that can be seen: " + error_text(lightmap) + "; its 8-bit image: " + error_text(lightmap["image"]);
+  if (out.empty()) return {};
   const json levels = document.contains("lightfield") ? list_of(document["lightfield"], "levels") : json::array();
   for (const json& level : levels) {
     if (!level.contains("certificate") || !level["certificate"].is_object()) continue;
@@ -140,10 +149,12 @@ bool promise_kept(std::string_view report) {
 
 std::optional<double> certified_error(std::string_view report) {
   const json document = parsed(report);
-  if (!document.contains("certificate") || !document["certificate"].is_object()) return std::nullopt;
-  const json& certificate = document["certificate"];
-  if (!certificate.contains("relrmse") || !certificate["relrmse"].is_number()) return std::nullopt;
+  json certificate = document.value("certificate", json());
+  if (!certificate.is_object()) certificate = certificate_of(document, "lightmap");
+  if (!certificate.is_object() || !certificate.contains("relrmse") || !certificate["relrmse"].is_number())
+    return std::nullopt;
   return std::max({certificate["relrmse"].get<double>(), number_of(certificate_of(document, "grid"), "relrmse"),
+                   number_of(certificate_of(document, "lightmap"), "relrmse"),
                    number_of(certificate_of(document, "lightfield"), "relrmse")});
 }
 

@@ -97,7 +97,7 @@ class PrimitiveBuilder {
                        return std::array{n.x, n.y, n.z};
                      })});
     add_texcoords(0, part_.has_uv0 ? &mesh_.uv0 : nullptr, e.texcoord_bits);
-    add_texcoords(1, part_.has_uv1 ? &mesh_.uv1 : nullptr, e.texcoord_bits);
+    add_texcoords(1, part_.has_uv1 ? &mesh_.uv1 : nullptr, e.lightmap_bits);
     if (part_.has_tangent) {
       add({"TANGENT"}, {StreamKind::generic, 4, kTangentBits, {-1, -1, -1, -1}, 2, gather<4>(vertices_, [&](auto v) {
                           const Vec4f& t = mesh_.tangent[v];
@@ -143,11 +143,13 @@ class PrimitiveBuilder {
     out_.mesh.streams.push_back(std::move(stream));
   }
 
-  /// A part without coordinates that its textures ask for gets zeros: so the bake saw it, and the format demands it.
+  /// A part without coordinates that its textures ask for gets zeros: so the bake saw it, and the format demands it, as
+  /// it demands the first set where there is the second.
   void add_texcoords(int set, const std::vector<Vec2f>* uv, int bits) {
+    const Material& material = baked_.scene.materials[static_cast<std::size_t>(part_.material)];
     if (uv) {
       add({"TEXCOORD_" + std::to_string(set)}, texcoord_stream(*uv, vertices_, bits));
-    } else if (uses_uv_set(baked_.scene.materials[static_cast<std::size_t>(part_.material)], set)) {
+    } else if (uses_uv_set(material, set) || (set == 0 && (part_.has_uv1 || uses_uv_set(material, 1)))) {
       add({"TEXCOORD_" + std::to_string(set)},
           {StreamKind::texcoord, 2, bits, {}, 1, std::vector<float>(2 * vertices_.size(), 0.0F)});
     }

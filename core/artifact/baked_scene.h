@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/artifact/import.h"
+#include "core/artifact/lightmap_file.h"
 #include "core/base/result.h"
 #include "core/lightfield/mirrored_sky.h"
 #include "core/prt/components.h"
@@ -30,6 +31,7 @@ struct BakedScene {
   LobeTable lobes;        // of glossy.order, where there are matrices
   LightField field;       // of scene.mesh's vertices, or of none
   SkyLevels sky;          // where the field keeps it apart
+  Lightmap lightmap;      // to be shown in place of the vertices' light; not written by write_baked_glb
   BakedLight light;
   float exposure = 1;      // COLOR_0 = tone map of exposure * radiance
   std::string provenance;  // a JSON object for asset.extras.kiln; "{}" if none
@@ -48,6 +50,7 @@ struct Encoding {
   int position_bits = 20;  // over the unit cube, one grid for all primitives (no cracks)
   int normal_bits = 12;
   int texcoord_bits = 14;
+  int lightmap_bits = 14;  // of TEXCOORD_1
   TransferEncoding transfer;
   TransferEncoding field;  // of r-RFs, as if they were transfer vectors
   int visibility_bits = 10;

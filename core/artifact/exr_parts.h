@@ -1,5 +1,5 @@
 #pragma once
-// Multi-part OpenEXR files of half floats, as plain data.
+// OpenEXR files of one or more parts, half or float, as plain data.
 
 #include <map>
 #include <string>
@@ -15,6 +15,7 @@ struct ExrPart {
   int width = 0, height = 0, channels = 3;
   std::vector<float> pixels;                // [(row * width + column) * channels + channel], top row first
   std::map<std::string, std::string> text;  // header attributes of type string
+  bool half = true;                         // as written; else 32-bit floats
 };
 
 struct ExrLimits {
@@ -22,7 +23,7 @@ struct ExrLimits {
   std::uint64_t most_pixels = std::uint64_t{1} << 28;  // of all parts together
 };
 
-/// Half floats, ZIP (16 scan lines a block), increasing y. Values beyond 65504 must not be among them.
+/// ZIP (16 scan lines a block), increasing y. Values beyond 65504 must not be among halves.
 /// Repeat  same bytes for same parts
 Bytes write_exr_parts(const std::vector<ExrPart>&);
 

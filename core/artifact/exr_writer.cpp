@@ -43,9 +43,24 @@ Imf::Header header_of(const ExrPart& part, const Imath::Box2i& display) {
   Imf::Header header(display, window, 1, Imath::V2f(0, 0), 1, Imf::INCREASING_Y, Imf::ZIP_COMPRESSION);
   header.setName(part.name);
   header.setType(Imf::SCANLINEIMAGE);
-  for (int c = 0; c < part.channels; ++c) header.channels().insert(kChannels[c], Imf::Channel(Imf::HALF));
+  const Imf::Channel channel(part.half ? Imf::HALF : Imf::FLOAT);
+  for (int c = 0; c < part.channels; ++c) header.channels().insert(kChannels[c], channel);
   for (const auto& [name, value] : part.text) header.insert(name, Imf::StringAttribute(value));
   return header;
+}
+
+/// Numbers of either kind, pixel by pixel.
+template <class T>
+void write_pixels(const ExrPart& part, Imf::PixelType type, const std::vector<T>& pixels, Imf::OutputPart& to) {
+  const auto channels = static_cast<std::size_t>(part.channels), width = static_cast<std::size_t>(part.width);
+  EXPECTS(pixels.size() == width * static_cast<std::size_t>(part.height) * channels);
+  Imf::FrameBuffer frame;
+  for (std::size_t c = 0; c < channels; ++c) {
+    char* first = const_cast<char*>(reinterpret_cast<const char*>(pixels.data() + c));  // OpenEXR only reads it
+    frame.insert(kChannels[c], Imf::Slice(type, first, channels * sizeof(T), width * channels * sizeof(T)));
+  }
+  to.setFrameBuffer(frame);
+  to.writePixels(part.height);
 }
 
 }  // namespace
@@ -61,18 +76,12 @@ Bytes write_exr_parts(const std::vector<ExrPart>& parts) {
     Imf::MultiPartOutputFile file(out, headers.data(), static_cast<int>(headers.size()), false, 0);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const ExrPart& part = parts[i];
-      const auto channels = static_cast<std::size_t>(part.channels), width = static_cast<std::size_t>(part.width);
-      EXPECTS(part.pixels.size() == width * static_cast<std::size_t>(part.height) * channels);
-      std::vector<half> pixels(part.pixels.size());
-      std::copy(part.pixels.begin(), part.pixels.end(), pixels.begin());
-      Imf::FrameBuffer frame;
-      for (std::size_t c = 0; c < channels; ++c) {
-        frame.insert(kChannels[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(pixels.data() + c),
-                                              channels * sizeof(half), width * channels * sizeof(half)));
-      }
       Imf::OutputPart to(file, static_cast<int>(i));
-      to.setFrameBuffer(frame);
-      to.writePixels(part.height);
+      if (part.half) {
+        write_pixels(part, Imf::HALF, std::vector<half>(part.pixels.begin(), part.pixels.end()), to);
+      } else {
+        write_pixels(part, Imf::FLOAT, part.pixels, to);
+      }
     }
   }
   return std::move(out.bytes);

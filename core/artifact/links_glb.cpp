@@ -1,16 +1,17 @@
 #include "core/artifact/links_glb.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/glb.h"
+#include "core/artifact/glb_arrays.h"
 #include "core/artifact/glb_extension.h"
 #include "core/artifact/gltf_bytes.h"
 #include "core/artifact/gltf_check.h"
 #include "core/artifact/json_fields.h"
+#include "core/artifact/points_glb.h"
 #include "core/base/expects.h"
 
 namespace kiln {
@@ -24,7 +25,6 @@ constexpr int kVersion = 1;
 constexpr std::uint32_t kMostSweeps = 1000;
 constexpr float kMostTail = 1e4F, kFarOut = 4;  // of the unit cube
 
-static_assert(std::endian::native == std::endian::little, "the arrays of the file are little endian");
 static_assert(sizeof(LightLink) == 8 && sizeof(SenderSample) == 16 && sizeof(TreeChild) == 4 && sizeof(RowSite) == 16);
 
 // Writing.
@@ -80,32 +80,6 @@ json extension_of(const LightLinks& l, Appender& to) {
 }
 
 // Reading.
-
-class Views {
- public:
-  Views(const Fields& fields, const gltf::BufferBytes& bytes, Findings& findings)
-      : fields_(fields), bytes_(bytes), findings_(findings) {}
-
-  template <class T>
-  std::vector<T> take(const char* name) const {
-    if (!fields_.has(name)) return {};
-    const int index = fields_.index(name, bytes_.views.size());
-    if (findings_.failed()) return {};
-    const auto view = bytes_.views[static_cast<std::size_t>(index)];
-    if (view.size() % sizeof(T) != 0) {
-      findings_.fail("slot_count_mismatch", "The buffer view does not hold whole elements.", fields_.pointer(name));
-      return {};
-    }
-    std::vector<T> out(view.size() / sizeof(T));
-    if (!out.empty()) std::memcpy(out.data(), view.data(), view.size());
-    return out;
-  }
-
- private:
-  const Fields& fields_;
-  const gltf::BufferBytes& bytes_;
-  Findings& findings_;
-};
 
 class Checker {
  public:
@@ -179,7 +153,7 @@ LightLinks links_in(const Fields& fields, const gltf::BufferBytes& bytes, std::s
   l.sweeps = static_cast<std::uint32_t>(sweeps);
   l.tail = static_cast<float>(tail);
   const Fields views = fields.object("bufferViews");
-  const Views from(views, bytes, findings);
+  const ArrayViews from(views, bytes, findings);
   l.sample_begin = from.take<std::uint32_t>("sampleBegin");
   l.samples = from.take<SenderSample>("samples");
   l.child_begin = from.take<std::uint32_t>("childBegin");
@@ -202,6 +176,7 @@ LightLinks links_in(const Fields& fields, const gltf::BufferBytes& bytes, std::s
 LightLinks read_file(std::span<const std::uint8_t> file, std::size_t vertices, Findings& findings) {
   LightLinks out;
   read_root_extension(file, kName, findings, [&](const Fields& extension, const gltf::BufferBytes& bytes) {
+    if (extension.count("version", 0) == kPointsVersion) return;  // points_glb.h
     out = links_in(extension, bytes, vertices, findings);
   });
   return out;

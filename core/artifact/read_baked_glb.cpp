@@ -245,9 +245,15 @@ Light unit_light(const gltf::Document& document, const gltf::Node& node, const F
   return light;
 }
 
+/// Each scene has materials of its own: the originals, their unlit twins, and with a lightmap (lightmap_file.h) twins
+/// that carry it.
+std::size_t original_materials(const gltf::Document& d) {
+  return d.materials.size() / std::max<std::size_t>(2, d.meshes.size());
+}
+
 void read_look(const BakedFile& file, Scene& scene) {
   const gltf::Document& d = file.document;
-  const auto originals = static_cast<std::ptrdiff_t>(d.materials.size() / 2);
+  const auto originals = static_cast<std::ptrdiff_t>(original_materials(d));
   scene.materials.assign(d.materials.begin(), d.materials.begin() + originals);
   scene.textures = d.textures;
   for (const gltf::ImageSource& image : d.images) {
@@ -265,16 +271,19 @@ void read_look(const BakedFile& file, Scene& scene) {
 
 /// The two scenes mirror each other, and every part names an original material.
 void check_shape(const gltf::Document& d, const BakedHeader& header, Findings& findings) {
-  const bool mirrored = d.meshes.size() == 2 && d.roots.size() == 1 && !d.meshes[0].primitives.empty() &&
+  const bool mirrored = (d.meshes.size() == 2 || d.meshes.size() == 3) && d.roots.size() == 1 &&
+                        !d.meshes[0].primitives.empty() &&
                         d.meshes[0].primitives.size() == d.meshes[1].primitives.size() &&
                         d.meshes[0].primitives.size() == header.parts.size();
   const bool any_matrix = std::ranges::any_of(header.parts, [](const auto& part) { return part.glossy; });
   if (any_matrix != bool{header.glossy})
     findings.fail("not_a_baked_scene", "Parts with matrices and the root's description of them go together.");
-  if (!mirrored) findings.fail("not_a_baked_scene", "A baked scene has two meshes with one primitive for each part.");
+  if (!mirrored)
+    findings.fail("not_a_baked_scene",
+                  "A baked scene has two meshes with one primitive for each part, and one more with a lightmap.");
   for (std::size_t i = 0; i < header.parts.size(); ++i) {
     const int material = header.parts[i].material;
-    if (material >= 0 && static_cast<std::size_t>(material) < d.materials.size() / 2) continue;
+    if (material >= 0 && static_cast<std::size_t>(material) < original_materials(d)) continue;
     findings.fail("index_out_of_range", "The part names a material that is not there.", primitive_place(0, i));
   }
 }

@@ -7,6 +7,7 @@
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/evaluate.h"
 #include "core/artifact/look.h"
+#include "core/artifact/points_glb.h"
 #include "core/artifact/streams.h"
 #include "core/bake/bake_log.h"
 #include "core/bake/carried_light.h"
@@ -19,6 +20,7 @@
 #include "core/bake/light_field_stage.h"
 #include "core/bake/light_field_step.h"
 #include "core/bake/lightings.h"
+#include "core/bake/lightmap_step.h"
 #include "core/bake/links_step.h"
 #include "core/bake/plan.h"
 #include "core/bake/preview.h"
@@ -61,6 +63,7 @@ Result<void> check_memory(const Plan& plan, const Limits& limits) {
                    " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
                    (carried          ? "give the file fewer vertices"
                     : plan.grid      ? "lower /steps/0/resolution"
+                    : plan.lightmap  ? "lower /steps/0/lightmap/size or rays, or raise points/radius"
                     : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
                                      : "lower /steps/0/subdivide/triangles or /steps/0/order") +
                    ", or raise the limit");
@@ -96,7 +99,8 @@ Effort effort_of(const Recipe& recipe) {
   return recipe.promise ? first_effort(recipe.promise) : effort_of(recipe.quality);
 }
 
-Plan plan_of(const CarriedScene& in, const Recipe& recipe, const std::optional<Environment>& light, Threads& threads) {
+Result<Plan> plan_of(const CarriedScene& in, const Recipe& recipe, const std::optional<Environment>& light,
+                     Threads& threads) {
   const Scene& scene = in.scene;
   const Environment* sky = light ? &*light : nullptr;
   if (in.carries_light()) return make_carried_plan(in, recipe, sky != nullptr);
@@ -105,10 +109,15 @@ Plan plan_of(const CarriedScene& in, const Recipe& recipe, const std::optional<E
   if (recipe.light_field) return make_light_field_plan(scene, recipe, sky, threads);
   if (recipe.radiosity) {
     const RadiosityEffort effort = recipe.promise ? radiosity_effort(recipe.promise) : radiosity_effort(recipe.quality);
-    return make_radiosity_plan(scene, *recipe.radiosity, effort, sky, threads);
+    Plan plan = make_radiosity_plan(scene, *recipe.radiosity, effort, sky, threads);
+    if (!recipe.radiosity->deliver.lightmap) return plan;
+    const Result<void> done = plan_lightmap(scene, recipe, plan);
+    return done ? Result<Plan>(std::move(plan)) : tl::make_unexpected(done.error());
   }
   return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
 }
+
+constexpr int kLightmapBits = 20;  // of TEXCOORD_1 under a lightmap: a step of 1/128 texel at 8192 x 8192
 
 /// The delivered file, read back, with the input's pixels so that textures show in the preview, and its warnings
 /// for the report.
@@ -132,6 +141,8 @@ struct Pass {
   std::optional<ErrorSources> sources;
   std::optional<GridOutcome> grid;
   std::optional<LinksOutcome> links;
+  std::optional<LightmapOutcome> lightmap;
+  std::optional<PointsOutcome> point_field;
   std::optional<FieldOutcome> field;
   std::optional<GlossyReport> glossy;
 };
@@ -143,9 +154,16 @@ struct LitResults {
   std::optional<OutgoingLight> outgoing;
 };
 
+/// What else the solution is asked for, or null.
+struct LitBeside {
+  const LinksStep* links = nullptr;
+  LightmapStep* lightmap = nullptr;
+  PointField* points = nullptr;
+};
+
 /// The step `radiosity`, and where the plan has one the grid or the light field that looks at its surface.
 Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Environment* sky, Plan& plan,
-                               const LinksStep* links, BakeLog& log, Threads& threads) {
+                               const LitBeside& beside, BakeLog& log, Threads& threads) {
   plan.radiosity->seed = plan.radiosity->points.seed = input.recipe.seed;
   LitResults out;
   Result<GridOutcome> outcome;
@@ -161,9 +179,18 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
     }
   };
   std::optional<FinishSource> finish;
-  if (links != nullptr) {
-    hooks.more = {links->columns(),
-                  [&](std::span<const TransferPoint> points) { return links->values(points, threads); }};
+  if (beside.lightmap != nullptr) {
+    hooks.places = beside.lightmap->places();
+    hooks.lit_places = [&](const LitPlaces& lit) { beside.lightmap->light(lit, threads); };
+  }
+  if (beside.points != nullptr) {
+    hooks.lit_points = [&](const PointHierarchy& points, std::span<const Vec3f> value) {
+      *beside.points = make_point_field(points, value, threads);
+    };
+  }
+  if (beside.links != nullptr) {
+    hooks.more = {beside.links->columns(),
+                  [&](std::span<const TransferPoint> points) { return beside.links->values(points, threads); }};
   } else if (plan.field) {
     finish.emplace(scene);
     hooks.more = {FinishSource::kWidth,
@@ -173,6 +200,16 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   if (!outcome) return tl::make_unexpected(outcome.error());
   if (plan.grid) out.grid = std::move(*outcome);
   return out;
+}
+
+/// Adds the points to the file and reads them back.
+Result<PointsOutcome> deliver_points(Bytes& glb, const PointField& field, Threads& threads) {
+  const std::size_t before = glb.size();
+  KILN_TRY(with, add_points(glb, field));
+  glb = std::move(with);
+  KILN_TRY(read, read_points(glb));
+  threads.check();
+  return PointsOutcome{.levels = read.level_end, .bytes = glb.size() - before};
 }
 
 /// Leaves the surface that is the truth in `in.scene`: the refined one, or where vertices were merged that of the
@@ -186,6 +223,8 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   BakedLight own;
   Transport transport;
   std::unique_ptr<LinksStep> links;
+  std::optional<LightmapStep> lightmap;
+  std::optional<PointField> points;
   std::optional<OutgoingLight> outgoing;
   std::optional<Mesh> unmerged;
   double tail_left = plan.tail_left, points_squared = 0;
@@ -200,7 +239,13 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
       log.begin("links", 0.4);
       links = std::make_unique<LinksStep>(scene, plan, input.recipe.seed, log, threads);
     }
-    KILN_TRY(lit, solve_light(input, scene, light ? &*light : nullptr, plan, links.get(), log, threads));
+    if (plan.lightmap) {
+      if (!plan.lightmap->uv1.empty()) scene.mesh.uv1 = plan.lightmap->uv1;
+      lightmap.emplace(scene, plan, threads);
+    }
+    if (input.recipe.radiosity && input.recipe.radiosity->deliver.points) points.emplace();
+    const LitBeside beside{links.get(), lightmap ? &*lightmap : nullptr, points ? &*points : nullptr};
+    KILN_TRY(lit, solve_light(input, scene, light ? &*light : nullptr, plan, beside, log, threads));
     transport.transfer = std::move(lit.solved.transfer);
     transport.noise = std::move(lit.solved.noise);
     transport.bounce_rays = lit.solved.gather_rays;
@@ -218,6 +263,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   pass.bounce_rays = transport.bounce_rays;
   pass.merge = transport.merge;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
+  if (lightmap && !input.recipe.radiosity->deliver.vertices) baked.exposure = lightmap->exposure();
   std::optional<LightFieldStage> stage;
   if (outgoing) {
     pass.bounce_rays = outgoing->rays;
@@ -228,6 +274,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   if (baked.glossy)
     encoding.glossy_step = plan.glossy.compression * std::sqrt(6.0 / static_cast<double>(baked.glossy.rank()));
   if (stage) encoding.field = stage->encoding();
+  if (lightmap) encoding.lightmap_bits = kLightmapBits;
   const StorageProbes storage = probe_storage(baked, encoding.transfer, noise.direct.vertices);
   KILN_TRY(glb, write_baked_glb(baked, encoding));
   KILN_TRY(streams, stream_bytes(baked, encoding, glb));
@@ -243,8 +290,24 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     pass.bounce_rays += pass.links->stats.rays;
     streams.push_back({"links", pass.links->bytes});
   }
+  if (lightmap) {
+    log.begin("lightmap", 0.95);
+    const Tracer truth(scene, threads);
+    const LightmapStep::Job job{
+        decoded, truth, light ? &*light : nullptr, plan.radiosity->bounces, input.recipe, provenance(input)};
+    KILN_TRY(outcome, lightmap->finish(glb, job, log, threads));
+    streams.push_back({"lightmap", outcome.image_bytes});
+    if (!input.recipe.radiosity->deliver.vertices) decoded.lightmap = outcome.lightmap;
+    pass.lightmap = std::move(outcome);
+  }
+  if (points) {
+    KILN_TRY(outcome, deliver_points(glb, *points, threads));
+    streams.push_back({"points", outcome.bytes});
+    pass.point_field = std::move(outcome);
+  }
   if (input.recipe.certificate) log.begin("certificate", 1.0);
-  if (input.recipe.certificate && !carried) {
+  const bool to_vertices = !input.recipe.radiosity || input.recipe.radiosity->deliver.vertices;
+  if (input.recipe.certificate && !carried && to_vertices) {
     const Tracer truth(scene, threads);
     pass.certificate = certify(decoded, truth, light,
                                {.bake_rays = log.rays() - rays_before,
@@ -363,7 +426,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
   threads.check();
 
   log.begin("plan", 0.06);
-  const Plan plan = plan_of(in, input.recipe, light, threads);
+  KILN_TRY(plan, plan_of(in, input.recipe, light, threads));
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   if (!light && !plan.lamps && !in.carries_light()) {
@@ -395,12 +458,15 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .sources = pass.sources,
                                           .grid = pass.grid,
                                           .links = pass.links,
+                                          .lightmap = pass.lightmap,
+                                          .points = pass.point_field,
                                           .field = pass.field,
                                           .glossy = pass.glossy,
                                           .passes = passes});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});
   if (pass.grid) output.files.push_back({"grid.exr", "image/x-exr", std::move(pass.grid->file)});
+  if (pass.lightmap) output.files.push_back({"lightmap.exr", "image/x-exr", std::move(pass.lightmap->exr)});
   if (pass.field) {
     for (std::size_t k = 0; k < pass.field->lods.size(); ++k) {
       output.files.push_back(
@@ -419,7 +485,7 @@ Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   KILN_TRY(in, read_scene(input));
   Scene& scene = in.scene;
   KILN_TRY(light, job_light(input));
-  const Plan plan = plan_of(in, input.recipe, light, threads);
+  KILN_TRY(plan, plan_of(in, input.recipe, light, threads));
   if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   return plan_report_json(plan, scene, input.recipe.promise);

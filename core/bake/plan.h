@@ -42,6 +42,13 @@ struct FieldPlan {
   Prediction surface;                // of the bake but for the field
 };
 
+/// The lightmap of the step `radiosity` (lightmap_step.h).
+struct LightmapPlan {
+  int side = 0;             // texels
+  std::vector<char> parts;  // of the scene: whether it shows them
+  std::vector<Vec2f> uv1;   // of the input's vertices, as delivered; empty: as they came
+};
+
 struct Plan {
   int order = 6;
   int bounces = 0;
@@ -59,10 +66,12 @@ struct Plan {
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
   GlossyPlan glossy;
-  std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
-  std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
-  std::optional<LinkParams> links;     // of the step `transport`; `radiosity` is there too
-  std::optional<FieldPlan> field;      // of the step `lightfield`; `radiosity` is there too, unless carried
+  std::optional<Radiosity> radiosity;      // of the step `radiosity`; order is 0 then
+  std::uint64_t triangles_of_quality = 0;  // added where light changes, by `radiosity` where the recipe does not say
+  std::optional<LightmapPlan> lightmap;    // of the step `radiosity`
+  std::optional<GridBake> grid;            // of the step `grid`; `radiosity` is there too
+  std::optional<LinkParams> links;         // of the step `transport`; `radiosity` is there too
+  std::optional<FieldPlan> field;          // of the step `lightfield`; `radiosity` is there too, unless carried
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

@@ -76,8 +76,15 @@ struct Painter {
     const Triangle& t = scene.mesh.triangles[hit.triangle];
     if (!baked.field.coefficients.empty()) return tone_map(of_field(hit, place, direction) * baked.exposure);
     if (baked.glossy && has_matrices(baked.glossy, t)) return shown(specular(hit, place, t, direction), place);
-    const Vec3f at = value[t[0]] * (1 - hit.u - hit.v) + value[t[1]] * hit.u + value[t[2]] * hit.v;
-    return shown(at * albedo_at(scene, place), place);
+    return shown(light_at(hit, t) * albedo_at(scene, place), place);
+  }
+
+  /// What a white surface would send out.
+  Vec3f light_at(const Hit& hit, const Triangle& t) const {
+    const Mesh& mesh = tracer.scene().mesh;
+    const auto mix = [&](const auto& x) { return x[t[0]] * (1 - hit.u - hit.v) + x[t[1]] * hit.u + x[t[2]] * hit.v; };
+    const Lightmap& map = baked.lightmap;
+    return map.side > 0 && map.parts[mesh.part[hit.triangle]] != 0 ? map.at(mix(mesh.uv1)) : mix(value);
   }
 
   Vec3f shown(const Vec3f& reflected, const SurfacePoint& place) const {

@@ -180,16 +180,18 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, const Ra
   using Mode = PrtStep::Subdivision::Mode;
   const std::uint64_t input = scene.mesh.triangles.size();
   const std::uint64_t budget = step.subdivide.triangles.value_or(input + effort.triangles);
-  plan.split = step.subdivide.mode != Mode::off && budget > input;
+  plan.split = step.deliver.vertices && step.subdivide.mode != Mode::off && budget > input;
+  plan.triangles_of_quality = effort.triangles;
   plan.subdivide = {.measure = step.subdivide.measure,
                     .alpha = step.subdivide.alpha,
                     .threshold = step.subdivide.threshold.value_or(effort.threshold),
                     .triangles = budget,
                     .max_depth = step.subdivide.max_depth};
   decide(plan, "subdivide", plan.split ? "up to " + std::to_string(budget) + " triangles" : "no",
-         step.subdivide.mode == Mode::off ? "turned off by the recipe"
-         : step.subdivide.triangles       ? asked
-                                          : effort.reason + std::string(" adds triangles where direct light changes"));
+         !step.deliver.vertices             ? "the light of the vertices is not delivered"
+         : step.subdivide.mode == Mode::off ? "turned off by the recipe"
+         : step.subdivide.triangles         ? asked
+                                    : effort.reason + std::string(" adds triangles where direct light changes"));
   const Tracer tracer(scene, threads);
   plan.costs = pilot_direct(tracer, plan, sky, threads);
   predict_radiosity(plan, scene);
@@ -275,16 +277,30 @@ SolvedRadiosity solve_radiosity_step(Scene& scene, Plan& plan, const Environment
 
   log.begin("bounces", plan.grid ? 0.4 : 0.85);
   const Tracer tracer(scene, threads);
+  params.places = hooks.places;
+  params.light_points = hooks.lit_points != nullptr;
   const RadiosityResult r = solve_radiosity(tracer, sky, params, threads);
   log.count_rays(r.stats.direct_rays + r.stats.gather_rays);
   for (const std::uint32_t n : r.stats.gathered) out.gathered += n;
   for (const std::uint32_t n : r.stats.points) out.points += n;
   decide(plan, "gathered", std::to_string(out.gathered) + " of " + std::to_string(out.points) + " points",
          "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
-             " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
+             (params.places.empty() ? "" : " texels and") + " vertices gather for themselves; " +
+             std::to_string(r.stats.sweeps) + " sweeps");
 
+  const std::size_t vertices = scene.mesh.position.size();
+  if (hooks.lit_points) hooks.lit_points(r.points, r.point_light);
+  if (hooks.lit_places) {
+    const DirectLight light(tracer, sky, params.direct);
+    std::uint64_t rays = 0;
+    hooks.lit_places(
+        {std::span(r.direct).subspan(vertices), std::span(r.indirect).subspan(vertices),
+         [&](std::span<const TransferPoint> points) { return light_at(points, light, params.seed, rays, threads); },
+         tracer});
+    log.count_rays(rays);
+  }
   std::vector<Vec3f> light;
-  for (std::size_t v = 0; v < r.direct.size(); ++v) light.push_back(r.direct[v] + r.indirect[v]);
+  for (std::size_t v = 0; v < vertices; ++v) light.push_back(r.direct[v] + r.indirect[v]);
   if (hooks.lit) hooks.lit(tracer, r.surface.get(), light);
 
   out.transfer = {.order = 0, .channels = 3, .fixed = true, .coefficients = {}};

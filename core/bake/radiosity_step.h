@@ -57,9 +57,19 @@ struct MoreLight {
   std::function<std::vector<float>(std::span<const TransferPoint>)> values = {};
 };
 
+/// The light of places besides the vertices, and how more direct light is found.
+struct LitPlaces {
+  std::span<const Vec3f> direct, reflected;
+  std::function<std::vector<Vec3f>(std::span<const TransferPoint>)> direct_at;
+  const Tracer& tracer;
+};
+
 struct RadiosityHooks {
   OnLit lit = {};
   MoreLight more = {};
+  std::vector<TransferPoint> places = {};                                              // besides the vertices,
+  std::function<void(const LitPlaces&)> lit_places = {};                               // told their light
+  std::function<void(const PointHierarchy&, std::span<const Vec3f>)> lit_points = {};  // told the light of the points
   bool sources = false;  // whether it is to be found where errors come from
 };
 

@@ -15,6 +15,7 @@ using nlohmann::json;
 constexpr std::int64_t kMaxBudget = 50'000'000;
 constexpr int kMostGridSide = 512;
 constexpr int kLeastMapSide = 64, kMostMapSide = 8192;
+constexpr int kLeastLightmap = 16, kMostLightmap = 8192;
 constexpr std::int64_t kMaxExactInteger = 9'007'199'254'740'991;  // 2^53 - 1: what a JSON number holds everywhere
 
 bool is_sha256(const std::string& text) {
@@ -154,6 +155,36 @@ RadiosityStep read_radiosity(JsonFields& fields, const std::string& pointer, Err
   return step;
 }
 
+RadiosityStep::Deliver read_deliver(const json& list, const std::string& pointer, Errors& errors) {
+  RadiosityStep::Deliver out{.vertices = false};
+  bool good = list.is_array() && !list.empty();
+  for (std::size_t i = 0; good && i < list.size(); ++i) {
+    bool* flag = list[i] == "vertices"   ? &out.vertices
+                 : list[i] == "lightmap" ? &out.lightmap
+                 : list[i] == "points"   ? &out.points
+                                         : nullptr;
+    good = flag != nullptr && !*flag;
+    if (good) *flag = true;
+  }
+  if (!good)
+    errors.push_back({pointer, "must name each form of delivery once", shown(list), "vertices, lightmap, points"});
+  return out;
+}
+
+/// The step `radiosity` has what `transport` has, and says how the light is delivered.
+RadiosityStep read_delivered_radiosity(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  RadiosityStep step = read_radiosity(fields, pointer, errors);
+  if (const json* value = fields.find("deliver")) step.deliver = read_deliver(*value, pointer + "/deliver", errors);
+  if (const json* value = fields.find("lightmap")) {
+    JsonFields lightmap(*value, pointer + "/lightmap", errors);
+    if (const auto size = lightmap.integer_or_auto("size", kLeastLightmap, kMostLightmap))
+      step.lightmap_size = static_cast<int>(*size);
+    lightmap.finish();
+    if (!step.deliver.lightmap) fields.error("lightmap", "means nothing where none is delivered", "deliver: lightmap");
+  }
+  return step;
+}
+
 TransportStep read_transport(JsonFields& fields, const std::string& pointer, Errors& errors) {
   TransportStep step{.surface = read_radiosity(fields, pointer, errors), .sender_level = {}};
   if (const auto level = fields.integer_or_auto("sender_level", 0, 11)) step.sender_level = static_cast<int>(*level);
@@ -251,7 +282,7 @@ bool read_step(const json& value, const std::string& pointer, Recipe& recipe, Er
   const auto step = fields.word("do", {"prt", "radiosity", "grid", "transport", "reduce", "lightfield"});
   if (!step) return false;
   if (*step == 0) recipe.steps.push_back(read_prt(fields, pointer, errors));
-  if (*step == 1) recipe.radiosity = read_radiosity(fields, pointer, errors);
+  if (*step == 1) recipe.radiosity = read_delivered_radiosity(fields, pointer, errors);
   if (*step == 2) recipe.grid = read_grid(fields);
   if (*step == 3) recipe.transport = read_transport(fields, pointer, errors);
   if (*step == 4) recipe.reduce = read_reduce(fields);
@@ -321,6 +352,10 @@ void check_points_promise(const RadiosityStep& step, Errors& errors) {
   if (step.rays && step.radius && split_fixed) {
     errors.push_back({"/quality", "leaves nothing to spend: rays, radius of points and triangles of the step are given",
                       "", "a promise, or all three knobs"});
+  }
+  if (!step.deliver.vertices) {
+    errors.push_back({"/quality", "is proven of the light at vertices, which the step does not deliver", "",
+                      "/steps/0/deliver with vertices"});
   }
 }
 

@@ -72,6 +72,11 @@ struct RadiosityStep {
   std::optional<int> rays;               // of a gather
   std::optional<int> bounces;
   PrtStep::Subdivision subdivide;
+  struct Deliver {
+    bool vertices = true, lightmap = false, points = false;
+  };
+  Deliver deliver;                   // of the step `radiosity`
+  std::optional<int> lightmap_size;  // texels along a side; auto when absent
 };
 
 /// Irradiance vectors over a lattice (core/grid/bake_grid.h), and the scene lit as by RadiosityStep.

@@ -64,14 +64,22 @@ json step_json(const PrtStep& step) {
   return out;
 }
 
+/// `deliver` is left out where it is vertices alone, as above.
 json step_json(const RadiosityStep& step) {
-  return {{"do", "radiosity"},
-          {"scheme", "rows"},
-          {"points", {{"radius", or_auto(step.radius)}, {"levels", or_auto(step.levels)}}},
-          {"eps_irradiance", or_auto(step.eps_irradiance)},
-          {"rays", or_auto(step.rays)},
-          {"bounces", or_auto(step.bounces)},
-          {"subdivide", subdivision_json(step.subdivide)}};
+  json out = {{"do", "radiosity"},
+              {"scheme", "rows"},
+              {"points", {{"radius", or_auto(step.radius)}, {"levels", or_auto(step.levels)}}},
+              {"eps_irradiance", or_auto(step.eps_irradiance)},
+              {"rays", or_auto(step.rays)},
+              {"bounces", or_auto(step.bounces)},
+              {"subdivide", subdivision_json(step.subdivide)}};
+  const RadiosityStep::Deliver& to = step.deliver;
+  if (!to.lightmap && !to.points) return out;
+  if (to.vertices) out["deliver"].push_back("vertices");
+  if (to.lightmap) out["deliver"].push_back("lightmap");
+  if (to.points) out["deliver"].push_back("points");
+  if (to.lightmap) out["lightmap"] = {{"size", or_auto(step.lightmap_size)}};
+  return out;
 }
 
 json step_json(const TransportStep& step) {

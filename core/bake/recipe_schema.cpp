@@ -61,6 +61,7 @@ std::string recipe_schema() {
     },
     "radiosity": {
       "type": "object", "required": ["do"], "additionalProperties": false,
+      "not": {"required": ["lightmap"], "properties": {"deliver": {"not": {"contains": {"enum": ["lightmap"]}}}}},
       "properties": {
         "do": {"enum": ["radiosity"]},
         "scheme": {"$ref": "#/definitions/gather_scheme"},
@@ -68,7 +69,15 @@ std::string recipe_schema() {
         "eps_irradiance": {"$ref": "#/definitions/eps_irradiance"},
         "rays": {"$ref": "#/definitions/gather_rays"},
         "bounces": {"$ref": "#/definitions/gather_bounces"},
-        "subdivide": {"$ref": "#/definitions/subdivide"}
+        "subdivide": {"$ref": "#/definitions/subdivide"},
+        "deliver": {
+          "description": "where the light goes: to the vertices, which are split where it changes; into a lightmap over TEXCOORD_1 (MOZ_lightmap in scene.glb, and lightmap.exr); as the hierarchy of points that it was solved on (KILN_meshless_light). Without vertices the mesh is not split",
+          "type": "array", "minItems": 1, "uniqueItems": true, "items": {"enum": ["vertices", "lightmap", "points"]}, "default": ["vertices"]
+        },
+        "lightmap": {
+          "type": "object", "additionalProperties": false,
+          "properties": {"size": {"description": "texels along a side; auto: as many as the quality has for the surface", "anyOf": [{"type": "integer", "minimum": 16, "maximum": 8192}, {"$ref": "#/definitions/auto"}], "default": "auto"}}
+        }
       }
     },
     "transport": {

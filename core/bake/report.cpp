@@ -175,6 +175,29 @@ ordered_json links_object(const LinksOutcome& links) {
           {"certificate", links_certificate_object(links.certificate)}};
 }
 
+ordered_json lightmap_object(const LightmapOutcome& map) {
+  ordered_json certificate;
+  if (map.certificate) {
+    const LightmapCertificate& c = *map.certificate;
+    certificate = error_object(c.error);
+    certificate["image"] = error_object(c.image);
+    certificate["points"] = c.points;
+    certificate["samples"] = c.samples;
+    certificate["mean_light"] = c.mean_light;
+    certificate["dark"] = c.dark;
+    certificate["rays"] = c.rays;
+    certificate["seconds"] = c.seconds;
+  }
+  return {{"size", map.lightmap.side},
+          {"texels", map.texels},
+          {"hidden_texels", map.hidden},
+          {"seam_places", map.seam_places},
+          {"texels_per_metre", map.texels_per_metre},
+          {"image_bytes", map.image_bytes},
+          {"exr_bytes", map.exr.size()},
+          {"certificate", certificate}};
+}
+
 ordered_json field_certificate_object(const std::optional<FieldCertificate>& certificate) {
   if (!certificate) return nullptr;
   ordered_json out = error_object(certificate->radiance);
@@ -412,6 +435,8 @@ std::string report_json(const ReportInput& in) {
   if (in.sources) out["error_sources"] = sources_object(*in.sources, in.plan);
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.links) out["links"] = links_object(*in.links);
+  if (in.lightmap) out["lightmap"] = lightmap_object(*in.lightmap);
+  if (in.points) out["points"] = {{"levels", in.points->levels}, {"bytes", in.points->bytes}};
   if (in.recipe.promise) out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in);
   if (in.field) out["lightfield"] = field_object(*in.field);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);

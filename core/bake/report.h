@@ -10,6 +10,7 @@
 #include "core/bake/glossy_certificate.h"
 #include "core/bake/grid_outcome.h"
 #include "core/bake/light_field_stage.h"
+#include "core/bake/lightmap_step.h"
 #include "core/bake/links_step.h"
 #include "core/bake/merge_step.h"
 #include "core/bake/plan.h"
@@ -23,6 +24,12 @@ struct GlossyReport {
   std::size_t vertices = 0, rank = 0;
   double compression = 0, noise = 0;  // as GlossyBaked
   std::optional<GlossyCertificate> certificate;
+};
+
+/// The points of a radiosity bake, as delivered.
+struct PointsOutcome {
+  std::vector<std::uint32_t> levels;  // points up to the end of each
+  std::uint64_t bytes = 0;            // in the file
 };
 
 /// Everything a report is made from.
@@ -41,6 +48,8 @@ struct ReportInput {
   const std::optional<ErrorSources>& sources;
   const std::optional<GridOutcome>& grid;
   const std::optional<LinksOutcome>& links;
+  const std::optional<LightmapOutcome>& lightmap;
+  const std::optional<PointsOutcome>& points;
   const std::optional<FieldOutcome>& field;
   const std::optional<GlossyReport>& glossy;
   const Passes& passes;  // none where a quality was asked for

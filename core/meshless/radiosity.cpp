@@ -36,6 +36,7 @@ class Solver {
         rough_light_(tracer, sky, params.direct.rough()),
         vertices_(vertex_points(tracer.scene().mesh)) {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
+    vertices_.insert(vertices_.end(), params.places.begin(), params.places.end());
     begin_stage("points");
     const std::vector<std::uint32_t> part = parts_of_vertices();
     for (std::size_t v = 0; v < vertices_.size(); ++v) {
@@ -51,12 +52,16 @@ class Solver {
 
   RadiosityResult solve() {
     begin_stage("direct");
-    out_.direct = params_.known_direct.empty() ? direct_at(vertices_, light_) : params_.known_direct;
+    find_direct();
     out_.indirect.resize(vertices_.size());
     for (std::size_t level = 0; level < points().levels(); ++level) {
       out_.stats.points.push_back(points().level_end[level] - points().begin(level));
     }
     out_.stats.gathered.resize(points().levels());
+    if (params_.light_points) {
+      out_.points = points();
+      out_.point_light = direct_at(at_, light_);
+    }
     if (params_.bounces == 0) {
       out_.surface.reset();
       return std::move(out_);
@@ -76,6 +81,16 @@ class Solver {
 
   void begin_stage(std::string_view name) const {
     if (params_.stage) params_.stage(name);
+  }
+
+  void find_direct() {
+    if (params_.known_direct.empty()) {
+      out_.direct = direct_at(vertices_, light_);
+      return;
+    }
+    out_.direct = params_.known_direct;
+    const std::vector<Vec3f> more = direct_at(params_.places, light_);
+    out_.direct.insert(out_.direct.end(), more.begin(), more.end());
   }
 
   std::vector<Vec3f> direct_at(const std::vector<TransferPoint>& places, const DirectLight& light) {
@@ -263,6 +278,10 @@ class Solver {
       if (done) break;
     }
     if (automatic) spread(gathered, total);
+    for_each(out_.point_light.size(), [&](std::size_t p) {
+      const std::uint32_t r = receiver_of_[p];
+      out_.point_light[p] += r != kNoReceiver ? gathered[r] : at_points_->apply(p, gathered);
+    });
     read_vertices(gathered, total);
     probe(total);
     out_.surface->set_light(std::move(total));
@@ -339,8 +358,8 @@ class Solver {
   const Tracer& tracer_;
   const Radiosity& params_;
   Threads& threads_;
-  DirectLight light_, rough_light_;  // at vertices, at points
-  std::vector<TransferPoint> vertices_;
+  DirectLight light_, rough_light_;       // at vertices, at points
+  std::vector<TransferPoint> vertices_;   // and the other places
   std::vector<Readings::Place> readers_;  // the same, with their groups
   std::vector<SurfaceSite> sites_;        // of the points
   std::vector<TransferPoint> at_;
@@ -362,6 +381,7 @@ class Solver {
 RadiosityResult solve_radiosity(const Tracer& tracer, const Environment* sky, const Radiosity& params,
                                 Threads& threads) {
   EXPECTS(params.known_direct.empty() || params.known_direct.size() == tracer.scene().mesh.position.size());
+  EXPECTS(params.places.empty() || !params.points.groups_by_part);  // a place says no part
   EXPECTS(params.rays >= 1 && params.rays <= 65536 && params.neighbours >= 1 && params.uniform_levels >= 1);
   return Solver(tracer, sky, params, threads).solve();
 }

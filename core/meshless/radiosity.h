@@ -1,5 +1,5 @@
 #pragma once
-// Radiosity at the vertices of a mesh, solved on points that know nothing of the mesh.
+// Radiosity at the vertices of a mesh and at any other places, solved on points that know nothing of the mesh.
 //   b = e + T b,   b = irradiance / pi; radiance that leaves is albedo x b, emission beside it
 // Paper   Lehtinen et al. 2007, section 6.3.   Differs  (scheme `rows`, which a trial found ten times faster)
 //  - direct light is found at each vertex (direct_light.h); only reflected light, which is smooth, lives on points;
@@ -14,7 +14,7 @@
 //  - vertices inside solids, and those that no function reaches, have rows of their own.
 // Bounces until what is left is below kTail of the light, by mixed sweeps (anderson.h); or as many as asked for.
 // Units   W m^-2 sr^-1 (value = irradiance / pi: what a white vertex radiates)
-// Cost    see README.md.   Memory  12 bytes a gathering ray, about 200 a point and 100 a vertex
+// Cost    see README.md.   Memory  12 bytes a gathering ray, about 200 a point and 100 a vertex or place
 // Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if stopped
 
 #include <cstdint>
@@ -46,6 +46,8 @@ struct Radiosity {
   std::vector<Vec3f> known_direct = {};    // direct light of each vertex; empty: it is found
   std::vector<StandIn> stand_ins = {};     // where hidden vertices are lit instead; ascending (core/prt/hidden.h)
   std::vector<std::uint32_t> probes = {};  // vertices that gather twice besides, for GatherProbe; change nothing else
+  std::vector<TransferPoint> places = {};  // to be lit as vertices are: texels of a lightmap
+  bool light_points = false;  // the light of the points themselves is asked for: RadiosityResult::point_light
   std::function<void(std::string_view stage)> stage = {};  // told as each begins: points, direct, gather, basis, sweeps
 };
 
@@ -67,10 +69,12 @@ struct GatherProbe {
 };
 
 struct RadiosityResult {
-  std::vector<Vec3f> direct, indirect;  // of each vertex of the tracer's mesh
+  std::vector<Vec3f> direct, indirect;  // of each vertex of the tracer's mesh, then of each of `places`
   std::unique_ptr<LitSurface> surface;  // with the light that one more reflection gathers: all of it, or that of
                                         // bounces - 1 reflections where their number is given; null where that is 0
   std::vector<GatherProbe> probes;      // of params.probes; none where nothing is reflected
+  PointHierarchy points;                // where the light of the points was asked for,
+  std::vector<Vec3f> point_light;       // and all of that light, direct light with as many rays as at vertices
   RadiosityStats stats;
 };
 

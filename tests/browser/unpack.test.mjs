@@ -80,6 +80,16 @@ test('the two scenes share their numbers, and no accessor: each may be disposed 
   });
 });
 
+test('points of a bake stay out of the plain file, and are no links', () => {
+  const points = readFileSync(new URL('fixtures/points.glb', import.meta.url)); // kiln-make-sample --lightmap points.glb 1 1
+  assert.equal(glbJson(points).json.extensions.KILN_meshless_light.version, 2);
+  const { file: plainly, links } = unpack(draco, bufferOf(points));
+  assert.equal(links, null);
+  const { json } = glbJson(Buffer.from(plainly));
+  assert.equal(json.extensions.KILN_meshless_light, undefined);
+  assert.equal(json.extensions.KILN_lightmap.version, 1);
+});
+
 test('images are the same bytes', () => {
   const [before, after] = [glbJson(file), plain].map(({ json, binary }) =>
     json.images.map(({ bufferView }) => {

@@ -2,7 +2,9 @@
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/carried_scene.h"
+#include "core/artifact/lightmap_file.h"
 #include "core/artifact/links_glb.h"
+#include "core/artifact/points_glb.h"
 #include "core/artifact/progressive_glb.h"
 #include "tests/fuzz/scene_reading.h"
 
@@ -14,6 +16,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   else
     fuzz::check_fault(carried.error());
   if (const auto progressive = read_progressive(file); !progressive) fuzz::check_fault(progressive.error());
+  if (const auto points = read_points(file); !points) fuzz::check_fault(points.error());
+  if (const auto lightmap = read_lightmap(file); !lightmap) fuzz::check_fault(lightmap.error());
   auto baked = read_baked_glb(file);
   if (!baked) {
     fuzz::check_fault(baked.error());

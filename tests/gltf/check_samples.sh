@@ -10,6 +10,7 @@ trap 'rm -rf "$dir"' EXIT
 "$1" --components "$dir/components.glb" 6 3
 "$1" --everything "$dir/everything.glb" 3 3
 "$1" --everything "$dir/order10.glb" 10 3
+"$1" --lightmap "$dir/lightmap.glb" 3 3
 "$1" --reduced "$dir/reduced.glb" 256
 "$1" --reduced "$dir/reduced_without_maps.glb" 0
 node "$here/validate.mjs" "$dir"/*.glb

@@ -11,6 +11,9 @@ kiln_test(baked_scene_test
   LINKS kiln_sample_scene nlohmann_json::nlohmann_json)
 set_source_files_properties(png_test.cpp PROPERTIES INCLUDE_DIRECTORIES /usr/include/stb)
 
+kiln_test(lightmap_file_test SOURCES lightmap_file_test.cpp points_glb_test.cpp
+  LINKS kiln_sample_scene nlohmann_json::nlohmann_json)
+
 # The Khronos validator over those samples. Skipped with its reason while tests/gltf/node_modules is missing.
 add_test(NAME gltf_validator COMMAND ${PROJECT_SOURCE_DIR}/tests/gltf/check_samples.sh $<TARGET_FILE:kiln-make-sample>)
 set_tests_properties(gltf_validator PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300)

@@ -1,5 +1,6 @@
 // kiln-make-sample OUT.glb [ORDER [CHANNELS]]               a sphere over a plane as a baked scene
 // kiln-make-sample --components OUT.glb [ORDER [CHANNELS]]  the same, stored as weights of 16 components
+// kiln-make-sample --lightmap OUT.glb [ORDER [CHANNELS]]    all of it, with a lightmap and points
 // kiln-make-sample --everything OUT.glb [ORDER [CHANNELS]]  all that the format can carry
 // kiln-make-sample --reduced OUT.glb [MAP]                  a coloured ball of 10,800 triangles in 1000, with maps of
 // MAP texels kiln-make-sample --import SCENE.gltf OUT.glb              a scene as if under an open sky, without a bake
@@ -10,6 +11,7 @@
 #include <span>
 #include <string>
 
+#include "core/artifact/points_glb.h"
 #include "core/artifact/reduced_glb.h"
 #include "core/reduce/reduce.h"
 #include "tests/core/artifact/sample_scene.h"
@@ -33,6 +35,17 @@ int write_file(const char* path, const kiln::Result<kiln::Bytes>& file) {
 
 int write_sample(const char* path, const kiln::BakedScene& scene, const kiln::Encoding& encoding = {}) {
   return write_file(path, kiln::write_baked_glb(scene, encoding));
+}
+
+/// Without regard to where texture coordinates lie.
+kiln::Result<kiln::Bytes> with_lightmap_and_points(const kiln::BakedScene& scene) {
+  KILN_TRY(plain, kiln::write_baked_glb(scene));
+  const std::size_t parts = scene.scene.parts.size();
+  const kiln::Lightmap map{
+      .side = 16, .texels = std::vector<kiln::Vec3f>(256, {1, 0.5F, 0}), .parts = std::vector<char>(parts, 1)};
+  KILN_TRY(lit, kiln::add_lightmap(plain, map, std::vector<char>(parts, 1)));
+  return kiln::add_points(
+      lit, {.sites = {{{0, 0, 0}, {0, 127, 0}, 0}}, .level_end = {1}, .radius = {1}, .coefficients = {{1, 2, 3}}});
 }
 
 kiln::Result<kiln::Bytes> reduced_ball(int map_side) {
@@ -67,7 +80,8 @@ int main(int argc, char** argv) {
   if (!mode.empty()) arguments = arguments.subspan(1);
   if (arguments.size() < (mode == "--import" ? 2u : 1u)) {
     std::fputs(
-        "usage: kiln-make-sample [--components | --everything | --reduced | --import SCENE.gltf] OUT.glb [ORDER | MAP "
+        "usage: kiln-make-sample [--components | --everything | --lightmap | --reduced | --import SCENE.gltf] OUT.glb "
+        "[ORDER | MAP "
         "[CHANNELS]]\n",
         stderr);
     return 64;
@@ -79,6 +93,8 @@ int main(int argc, char** argv) {
     const kiln::BakedScene scene = kiln::sphere_over_plane(order, channels, true);
     return write_sample(arguments[0], scene, {.transfer = kiln::as_components(scene, 16)});
   }
+  if (mode == "--lightmap")
+    return write_file(arguments[0], with_lightmap_and_points(kiln::everything(order, channels)));
   return write_sample(arguments[0], mode == "--everything" ? kiln::everything(order, channels)
                                                            : kiln::sphere_over_plane(order, channels, true));
 }

@@ -106,6 +106,28 @@ TEST(Recipe, OfRadiosityHasItsOwnParametersAndSurvivesARoundTrip) {
   EXPECT_EQ(recipe_json(*again), recipe_json(*recipe));
 }
 
+TEST(Recipe, OfRadiositySaysWhereTheLightGoes) {
+  const auto plain = parse_recipe(R"({"steps":[{"do":"radiosity"}]})");
+  const auto named = parse_recipe(R"({"steps":[{"do":"radiosity","deliver":["vertices"]}]})");
+  ASSERT_TRUE(plain && named);
+  EXPECT_EQ(recipe_json(*plain), recipe_json(*named));
+  EXPECT_EQ(recipe_json(*plain).find("deliver"), std::string::npos);  // hashes of older recipes stay what they were
+  const auto map =
+      parse_recipe(R"({"steps":[{"do":"radiosity","deliver":["points","lightmap"],"lightmap":{"size":512}}]})");
+  ASSERT_TRUE(map);
+  EXPECT_FALSE(map->radiosity->deliver.vertices);
+  EXPECT_TRUE(map->radiosity->deliver.lightmap && map->radiosity->deliver.points);
+  EXPECT_EQ(map->radiosity->lightmap_size, 512);
+  const auto again = parse_recipe(recipe_json(*map));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(recipe_json(*again), recipe_json(*map));
+  EXPECT_NE(recipe_identity(*map), recipe_identity(*plain));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"radiosity","deliver":["lightmap","maps"],"lightmap":{"size":4}}]})"),
+            (std::vector<std::string>{"/steps/0/deliver", "/steps/0/lightmap/size"}));
+  EXPECT_EQ(pointers(R"({"steps":[{"do":"radiosity","lightmap":{"size":64}}]})"),
+            std::vector<std::string>{"/steps/0/lightmap"});
+}
+
 TEST(Recipe, APromiseOfALightFieldNeedsSomethingToSpend) {
   EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"lightfield","degree":4,"rays":64}]})"));
   const std::string fixed = R"("steps":[{"do":"lightfield","degree":4,"rays":64,"subdivide":"off")";
@@ -120,6 +142,8 @@ TEST(Recipe, APromiseOfALightFieldNeedsSomethingToSpend) {
 
 TEST(Recipe, APromiseOfRadiosityNeedsSomethingToSpend) {
   EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity","rays":64}]})"));
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity","deliver":["lightmap"]}]})"),
+            std::vector<std::string>{"/quality"});
   EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},
                          "steps":[{"do":"radiosity","rays":64,"points":{"radius":0.1},"subdivide":"off"}]})"),
             (std::vector<std::string>{"/quality"}));

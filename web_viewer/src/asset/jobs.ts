@@ -160,6 +160,11 @@ export interface LevelReport {
   certificate?: { relrmse: number } | null; // towards every eye, against the surface as it was baked
 }
 
+interface Interval {
+  relrmse: number;
+  interval?: [number, number];
+}
+
 /// report.json; every part may be missing in an old one.
 export interface Report {
   engine?: string;
@@ -215,6 +220,14 @@ export interface Report {
     bytes: number;
     rays_per_vertex: number;
     certificate: { relrmse: number; interval?: [number, number]; sources?: Record<string, number> } | null;
+  };
+  lightmap?: {
+    size: number;
+    texels: number;
+    texels_per_metre: number;
+    image_bytes: number;
+    exr_bytes: number;
+    certificate: (Interval & { image: Interval }) | null;
   };
   recipe?: { environment?: { builtin?: string; rotation_deg?: number } | null };
   reduce?: {

@@ -147,10 +147,14 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
 
 const [kLinks, kField, kProgressive] = ['KILN_meshless_light', 'KILN_light_field', 'KILN_progressive_mesh'];
 
+const kPointsVersion = 2; // of KILN_meshless_light: the light of the bake on its points, which nothing here shows
+
 /// The links stay out of the GLB: its buffer views are others.
 function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLinks | null {
   const extension = json.extensions?.[kLinks] as LinksExtension | undefined;
-  return extension ? readLinks(takeExtension(json, kLinks, extension), bytesIn) : null;
+  if (!extension) return null;
+  const taken = takeExtension(json, kLinks, extension);
+  return taken.version === kPointsVersion ? null : readLinks(taken, bytesIn);
 }
 
 /// Light fields stay out of the GLB too.

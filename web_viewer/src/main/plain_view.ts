@@ -190,7 +190,7 @@ export async function showPlain(
 
   const help = helpDialog();
   const grid = artifact(job, 'grid.exr') !== undefined;
-  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels: [] });
+  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, lightmap: false, levels: [] });
   const actions = { screenshot: () => void saveScreenshot(stage, page.id), help: () => help.showModal() };
   page.main.append(panel.element);
   document.body.append(help);

@@ -77,7 +77,8 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
   const help = helpDialog();
   const levels = levelRows(levelsOf(job), report, viewer.model);
   const grid = artifact(job, 'grid.exr') !== undefined;
-  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels });
+  const lightmap = artifact(job, kLightmap) !== undefined;
+  const panel = new ViewPanel(viewer, statistics(viewer, report), { grid, levels, lightmap });
   if (haveSizes(levels)) {
     const bySize = new LevelBySize(viewer, levels.map(({ pixels }) => pixels ?? Infinity));
     page.onDispose(() => bySize.dispose());
@@ -105,9 +106,12 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     () => divider.dispose(),
     () => probe.dispose(),
   );
-  void Promise.all([openGrid(page, viewer, job), openLamp(page, viewer, report), openProgressive(page, viewer)]).then(
-    () => (document.documentElement.dataset.ready = 'true'),
-  );
+  void Promise.all([
+    openGrid(page, viewer, job),
+    openLightmap(page, viewer, job),
+    openLamp(page, viewer, report),
+    openProgressive(page, viewer),
+  ]).then(() => (document.documentElement.dataset.ready = 'true'));
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
 }
 
@@ -127,6 +131,25 @@ async function openGrid(page: Page, viewer: Viewer, job: Job): Promise<void> {
     Object.assign(window, { kilnGrid: view });
   } catch (error) {
     toast(`grid.exr cannot be shown: ${(error as Error).message}`, 'error');
+  }
+}
+
+const kLightmap = 'lightmap.exr';
+
+/// Without it the light of the vertices stays.
+async function openLightmap(page: Page, viewer: Viewer, job: Job): Promise<void> {
+  if (!artifact(job, kLightmap)) return;
+  try {
+    const [file, { readLightmap }, { LightmapView }] = await Promise.all([
+      download(artifactUrl(job, kLightmap), () => {}),
+      import('../asset/lightmap_file'),
+      import('./lightmap_view'),
+    ]);
+    const view = new LightmapView(viewer, readLightmap(file));
+    page.onDispose(() => view.dispose());
+    Object.assign(window, { kilnLightmap: view });
+  } catch (error) {
+    toast(`lightmap.exr cannot be shown: ${(error as Error).message}`, 'error');
   }
 }
 

@@ -42,6 +42,7 @@ export interface ViewState {
   lampPower: number; // stops
   lampBaked: boolean; // the light of the bake is added
   lampIndirect: boolean; // reflected light alone
+  lightmap: boolean; // shown in place of the light at the vertices, where there is one
   compare: number | null; // where the divider stands, 0 to 1; null: off
   pose: CameraPose | null; // null: the default view
 }
@@ -70,6 +71,7 @@ export const kDefaultState: ViewState = {
   lampPower: 0,
   lampBaked: false,
   lampIndirect: false,
+  lightmap: true,
   compare: null,
   pose: null,
 };
@@ -132,6 +134,7 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     lampPower: number('lampPower', -6, 6),
     lampBaked: flag('lampBaked'),
     lampIndirect: flag('lampIndirect'),
+    lightmap: flag('lightmap'),
     compare: from.has('compare') ? number('compare', 0, 1) : null,
     pose: pose.length === 6 && pose.every(Number.isFinite) ? (pose as unknown as CameraPose) : null,
   };

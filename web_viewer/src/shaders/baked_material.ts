@@ -2,6 +2,7 @@
 // Where a part has matrices (mirror.ts):
 //   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission
 //   F0 = mix(0.04, albedo, metallic)
+// With a lightmap (LIGHTMAP: lightmap_view.ts) the value is its irradiance / pi, filtered at each pixel.
 // With a lamp that moves (LAMP: lamp_view.ts) its direct light is added to the value at each pixel:
 //   lampIntensity cos / (pi d^2), a share of shadow taps free
 //
@@ -18,6 +19,9 @@ centroid varying vec3 vLight;
 #ifdef LAMP
 varying vec3 vLampPlace;
 varying vec3 vLampNormal;
+#endif
+#ifdef LIGHTMAP
+varying vec2 vLightmapUv;
 #endif
 #ifdef VERTEX_ALBEDO
 varying vec4 vAlbedo;
@@ -44,7 +48,7 @@ attribute vec3 light;
 #ifdef VERTEX_ALBEDO
 attribute vec4 _albedo;
 #endif
-#ifdef USE_UV1_SET
+#if defined(USE_UV1_SET) || defined(LIGHTMAP)
 attribute vec2 uv1;
 #endif
 #ifdef ALBEDO_MAP
@@ -66,6 +70,9 @@ ${mirrorFunctions}
 
 void main() {
   vLight = light;
+#ifdef LIGHTMAP
+  vLightmapUv = uv1;
+#endif
 #ifdef LAMP
   vLampPlace = (modelMatrix * vec4(position, 1.0)).xyz;
   vLampNormal = mat3(modelMatrix) * normal;
@@ -99,6 +106,9 @@ uniform float alpha;
 uniform float alphaCutoff;
 uniform vec3 emission;
 uniform bool white;
+#ifdef LIGHTMAP
+uniform sampler2D lightmap;
+#endif
 #ifdef ALBEDO_MAP
 uniform sampler2D albedoMap;
 #endif
@@ -160,7 +170,11 @@ void main() {
   emitted *= texture2D(emissionMap, vEmissionUv).rgb;
 #endif
   // Spherical harmonics ring: a point in deep shadow may come out a little below zero.
+#ifdef LIGHTMAP
+  vec3 value = texture2D(lightmap, vLightmapUv).rgb / 3.14159265;
+#else
   vec3 value = max(vLight, vec3(0.0));
+#endif
 #ifdef LAMP
   value += lampLight();
   emitted *= lampGlow;
@@ -234,6 +248,7 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, mir
       alphaCutoff: { value: unlit.alphaTest },
       emission: { value: glow?.factor ?? new Color().setRGB(emission[0], emission[1], emission[2]) },
       white: { value: false },
+      lightmap: { value: null },
       albedoMap: { value: albedoMap },
       albedoMapTransform: { value: transformOf(albedoMap) },
       emissionMap: { value: emissionMap },
@@ -247,6 +262,14 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, mir
     },
     ...sides(unlit),
   });
+}
+
+/// Puts a lightmap in place of the light at the vertices; null: takes it away. The texture is the caller's.
+export function showLightmap(material: ShaderMaterial, texture: Texture | null): void {
+  material.uniforms.lightmap.value = texture;
+  if (texture) material.defines.LIGHTMAP = '';
+  else delete material.defines.LIGHTMAP;
+  material.needsUpdate = true;
 }
 
 export const sides = ({ side, transparent, depthWrite }: Material) => ({

@@ -27,6 +27,7 @@ export function statistics(viewer: Counted, report: Report | null): HTMLElement 
     box.append(h('h3', {}, 'Light field'), pairs(lightField(viewer.level.field, report.lightfield)));
   if (report.reduce) box.append(h('h3', {}, 'Reduction'), pairs(reduction(report.reduce, report)));
   if (report.grid) box.append(h('h3', {}, 'Grid'), pairs(grid(report.grid)));
+  if (report.lightmap) box.append(h('h3', {}, 'Lightmap'), pairs(lightmap(report.lightmap)));
   if (report.links) box.append(h('h3', {}, 'Links'), pairs(links(report.links)));
   if (report.glossy?.radiance) box.append(h('h3', {}, 'Specular parts'), pairs(specular(report.glossy)));
   if (report.warnings?.length)
@@ -132,6 +133,16 @@ function grid(of: NonNullable<Report['grid']>): Row[] {
     ['Rays per vertex', count(rays)],
     ...(c ? [['Relative error', withInterval(c)] as const] : []),
     ['from noise, lattice, storage', ['noise', 'lattice', 'storage'].map(from).join(', ')],
+  ];
+}
+
+function lightmap(of: NonNullable<Report['lightmap']>): Row[] {
+  const { size, texels, texels_per_metre: density, image_bytes: image, exr_bytes: exr, certificate: c } = of;
+  return [
+    ['Size', `${size} × ${size}, ${count(texels)} texels lit`],
+    ['Texels a metre', density.toPrecision(3)],
+    ['In scene.glb, lightmap.exr', `${bytes(image)}, ${bytes(exr)}`],
+    ...(c ? [['Relative error', withInterval(c)] as const, ['of the 8-bit image', withInterval(c.image)] as const] : []),
   ];
 }
 

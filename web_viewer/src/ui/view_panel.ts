@@ -35,7 +35,7 @@ export class ViewPanel {
   constructor(
     private readonly viewer: Shown,
     statistics: HTMLElement,
-    private readonly has: { grid: boolean; levels: readonly LevelRow[] },
+    private readonly has: { grid: boolean; lightmap: boolean; levels: readonly LevelRow[] },
   ) {
     this.controls = new Controls(viewer.state);
     this.element = h(
@@ -148,6 +148,7 @@ export class ViewPanel {
       ...(hasLevels ? [levelSlider(controls, this.has.levels)] : []),
       ...(viewer.progressive ? this.detail() : []),
       controls.checkbox('wire', 'Wireframe'),
+      ...(this.has.lightmap ? [controls.checkbox('lightmap', 'Light from the lightmap (off: from the vertices)')] : []),
       ...(this.has.grid ? this.grid() : []),
       compareSwitch(viewer, controls),
     ];

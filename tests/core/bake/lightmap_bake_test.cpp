@@ -1,0 +1,311 @@
+// The lightmap of the step `radiosity`, from recipe to certificate.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/artifact/baked_scene.h"
+#include "core/artifact/lightmap_file.h"
+#include "core/artifact/points_glb.h"
+#include "core/mesh/texel_seams.h"
+#include "tests/core/artifact/gltf_samples.h"
+#include "tests/core/bake/bake_input.h"
+
+namespace kiln {
+namespace {
+
+using testing::file;
+using testing::report_of;
+
+/// A box from -1 to 1 that is seen from inside; each wall has four vertices and a rectangle of the picture.
+struct Room {
+  std::vector<float> position, normal, uv;
+  std::vector<std::uint32_t> index;
+
+  /// `fit(wall, u, v)`: where a corner at u, v of its wall lies in the picture.
+  template <class Fit>
+  explicit Room(const Fit& fit) {
+    for (int wall = 0; wall < 6; ++wall) {
+      const int axis = wall / 2;
+      const float side = wall % 2 == 0 ? -1.0F : 1.0F;
+      const auto first = static_cast<std::uint32_t>(position.size() / 3);
+      for (const auto& [u, v] : {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}}) {
+        std::array<float, 3> p{}, n{};
+        p[static_cast<std::size_t>(axis)] = side, n[static_cast<std::size_t>(axis)] = -side;
+        p[static_cast<std::size_t>((axis + 1) % 3)] = 2 * u - 1,
+                                                p[static_cast<std::size_t>((axis + 2) % 3)] = 2 * v - 1;
+        position.insert(position.end(), p.begin(), p.end());
+        normal.insert(normal.end(), n.begin(), n.end());
+        const std::array<float, 2> at = fit(wall, u, v);
+        uv.insert(uv.end(), at.begin(), at.end());
+      }
+      for (const std::uint32_t k : {0, 1, 2, 0, 2, 3}) index.push_back(first + k);
+      if (side > 0)
+        for (std::size_t k = index.size() - 6; k < index.size(); k += 3) std::swap(index[k + 1], index[k + 2]);
+    }
+  }
+};
+
+/// Three by two rectangles with gaps of 4 % between them.
+std::array<float, 2> beside(int wall, float u, float v) {
+  const auto column = static_cast<float>(wall % 3), row = static_cast<float>(wall / 3);
+  return {(column + 0.02F + 0.96F * u) / 3, (row + 0.02F + 0.96F * v) / 2};
+}
+std::array<float, 2> on_each_other(int, float u, float v) { return {u, v}; }
+
+struct Made {
+  std::string material;
+  int nodes = 1;             // of the same mesh, side by side
+  bool lamp = false;         // a point light of 3 W/sr at kLamp
+  bool half_bare = false;    // the last three walls are a primitive without TEXCOORD_1
+  std::string texture = "";  // members of the document
+};
+constexpr std::array<float, 3> kLamp{0.3F, 0.25F, -0.4F};
+
+Bytes glb_of(const Room& room, const Made& made) {
+  test::Sample sample;
+  const std::string p = std::to_string(sample.positions(room.position)),
+                    n = std::to_string(sample.normals(room.normal));
+  const std::string uv = std::to_string(sample.accessor(room.uv, 5126, "VEC2", room.uv.size() / 2));
+  const auto primitive = [&](std::size_t first, std::size_t count, bool coordinates) {
+    const auto begin = room.index.begin() + static_cast<std::ptrdiff_t>(first);
+    const int indices = sample.indices({begin, begin + static_cast<std::ptrdiff_t>(count)});
+    return R"({"attributes":{"POSITION":)" + p + R"(,"NORMAL":)" + n + (coordinates ? R"(,"TEXCOORD_1":)" + uv : "") +
+           R"(},"material":0,"indices":)" + std::to_string(indices) + "}";
+  };
+  const std::string primitives =
+      made.half_bare ? primitive(0, 18, true) + "," + primitive(18, 18, false) : primitive(0, 36, true);
+  std::string nodes, list;
+  for (int k = 0; k < made.nodes; ++k) {
+    nodes += R"({"mesh":0,"translation":[)" + std::to_string(3 * k) + ",0,0]},";
+    list += std::to_string(k) + ",";
+  }
+  const auto number = [](float x) { return std::to_string(x); };
+  nodes += R"({"translation":[)" + number(kLamp[0]) + "," + number(kLamp[1]) + "," + number(kLamp[2]) + "]" +
+           (made.lamp ? R"(,"extensions":{"KHR_lights_punctual":{"light":0}}})" : "}");
+  list += std::to_string(made.nodes);
+  return sample.glb(
+      R"("meshes":[{"primitives":[)" + primitives + R"(]}],"materials":[)" + made.material + R"(],"nodes":[)" + nodes +
+      R"(],"scenes":[{"nodes":[)" + list + R"(]}],"scene":0)" + made.texture +
+      R"(,"extensionsUsed":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3}]}})");
+}
+
+BakeInput input_of(Bytes scene, const std::string& recipe) {
+  BakeInput input;
+  input.scene.name = "room.glb";
+  input.scene.main = std::move(scene);
+  input.recipe = *parse_recipe(recipe);
+  return input;
+}
+
+/// Walls that glow with radiance .5 and reflect half.
+constexpr const char* kFurnace =
+    R"({"name":"wall","pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0},"emissiveFactor":[0.5,0.5,0.5]})";
+constexpr const char* kAlone =
+    R"({"steps":[{"do":"radiosity","deliver":["lightmap"],"lightmap":{"size":64}}],"quality":"draft"})";
+
+nlohmann::json warning_codes(const nlohmann::json& report) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const auto& w : report["warnings"]) out.push_back(w["code"]);
+  return out;
+}
+
+/// Emission over 1 - albedo is 1, everywhere, in texels of charts and beside them.
+void expect_furnace(const BakeOutput& output, float tolerance) {
+  const auto exact = read_lightmap_exr(file(output, "lightmap.exr"), "lightmap.exr");
+  const auto image = read_lightmap(file(output, "scene.glb"));
+  ASSERT_TRUE(exact && image);
+  ASSERT_EQ(exact->texels.size(), 64U * 64U);
+  ASSERT_EQ(image->texels.size(), 64U * 64U);
+  for (std::size_t i = 0; i < exact->texels.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(exact->texels[i][c], 1, tolerance) << i;
+      EXPECT_NEAR(image->texels[i][c], exact->texels[i][c], 0.5 * 1.1 / 255);  // half a step of a range of about 1
+    }
+  }
+}
+
+TEST(LightmapBake, OfAWhiteFurnaceIsConstant) {
+  Threads threads;
+  const auto output = bake(input_of(glb_of(Room(beside), {.material = kFurnace}), kAlone), {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  expect_furnace(*output, 0.01F);
+  const nlohmann::json report = report_of(*output), map = report["lightmap"];
+  EXPECT_EQ(warning_codes(report), nlohmann::json::array());
+  EXPECT_EQ(map["size"], 64);
+  EXPECT_EQ(map["hidden_texels"], 0);
+  EXPECT_LT(map["certificate"]["relrmse"].get<double>(), 0.01);
+  EXPECT_GT(map["certificate"]["points"], 1000);
+  EXPECT_TRUE(report["certificate"].is_null());
+  EXPECT_EQ(report["result"]["vertices"], 24);  // the mesh is not split
+  const auto decoded = read_baked_glb(file(*output, "scene.glb"));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_EQ(decoded->scene.materials.size(), 1U);
+}
+
+TEST(LightmapBake, OfInstancesAndLayoutsOnOneAnotherIsPackedAnewAndSaysSo) {
+  Threads threads;
+  const auto output =
+      bake(input_of(glb_of(Room(on_each_other), {.material = kFurnace, .nodes = 2}), kAlone), {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  expect_furnace(*output, 0.01F);
+  const nlohmann::json report = report_of(*output);
+  EXPECT_EQ(warning_codes(report), nlohmann::json::array({"lightmap_charts_packed"}));
+  const auto decoded = read_baked_glb(file(*output, "scene.glb"));
+  ASSERT_TRUE(decoded);
+  Mesh mesh = decoded->scene.mesh;
+  const UvCharts charts = find_uv_charts(mesh, std::vector<char>(mesh.triangles.size(), 1));
+  EXPECT_EQ(charts.count, 12U);
+  EXPECT_EQ(map_texels(mesh, charts, 64).across, 0U);
+}
+
+/// Reflects nothing.
+constexpr const char* kBlack =
+    R"({"name":"wall","pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0}})";
+constexpr const char* kBoth =
+    R"({"steps":[{"do":"radiosity","deliver":["vertices","lightmap"],"subdivide":{"triangles":2000},"lightmap":{"size":128}}],"quality":"draft"})";
+
+TEST(LightmapBake, OfAPointLightInABlackRoomIsIntensityTimesCosineOverSquaredDistance) {
+  Threads threads;
+  const auto output = bake(input_of(glb_of(Room(beside), {.material = kBlack, .lamp = true}), kBoth), {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  const auto decoded = read_baked_glb(file(*output, "scene.glb"));
+  const auto map = read_lightmap_exr(file(*output, "lightmap.exr"), "lightmap.exr");
+  ASSERT_TRUE(decoded && map);
+  const Mesh& mesh = decoded->scene.mesh;
+  const UvCharts charts = find_uv_charts(mesh, std::vector<char>(mesh.triangles.size(), 1));
+  std::size_t seen = 0;
+  for (const TexelPlace& at : map_texels(mesh, charts, 128).places) {
+    if (!at.inside) continue;
+    const Triangle& t = mesh.triangles[at.triangle];
+    const Vec3f unit =
+        mesh.position[t[0]] * (1 - at.u - at.v) + mesh.position[t[1]] * at.u + mesh.position[t[2]] * at.v;
+    const Vec3d way = Vec3d{kLamp[0], kLamp[1], kLamp[2]} - decoded->scene.frame.to_world(to_double(unit));
+    const double squared = dot(way, way), cosine = dot(way, to_double(mesh.normal[t[0]])) / std::sqrt(squared);
+    const double value = 3 * cosine / squared / std::numbers::pi;
+    EXPECT_NEAR(map->texels[at.texel].x, value, 1e-3 * value);  // 12 bits of a normal, 20 of a coordinate
+    ++seen;
+  }
+  EXPECT_GT(seen, 12000U);
+  // What is left is filtering between texels, and 8 bits; vertices of 2000 triangles have more.
+  const nlohmann::json report = report_of(*output);
+  const double exact = report["lightmap"]["certificate"]["relrmse"],
+               image = report["lightmap"]["certificate"]["image"]["relrmse"];
+  const double vertices = report["certificate"]["relrmse"];
+  std::printf("lightmap %.5f, 8 bits %.5f, vertices %.5f\n", exact, image, vertices);
+  EXPECT_LT(exact, 0.005);
+  EXPECT_LT(exact, vertices);
+  EXPECT_LT(image, 0.02);
+}
+
+TEST(LightmapBake, ThreadCountChangesNotOneByte) {
+  Threads one(1), three(3);
+  const Bytes scene = glb_of(Room(on_each_other), {.material = kFurnace, .lamp = true});
+  const auto a = bake(input_of(scene, kAlone), {}, one), b = bake(input_of(scene, kAlone), {}, three);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(file(*a, "scene.glb"), file(*b, "scene.glb"));
+  EXPECT_EQ(file(*a, "lightmap.exr"), file(*b, "lightmap.exr"));
+}
+
+TEST(LightmapBake, WithoutCoordinatesIsRefusedAndOfSomePartsIsAWarning) {
+  Threads threads;
+  const auto refused = plan_json(testing::input_of("room", kBoth), threads);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "no_lightmap_coordinates");
+  EXPECT_EQ(refused.error().where, "/steps/0/deliver");
+  const auto output =
+      bake(input_of(glb_of(Room(beside), {.material = kFurnace, .half_bare = true}), kAlone), {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  EXPECT_EQ(warning_codes(report_of(*output)), nlohmann::json::array({"lightmap_parts_missing"}));
+  const auto image = read_lightmap(file(*output, "scene.glb"));
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->parts, (std::vector<char>{1, 0}));
+}
+
+TEST(LightmapBake, KeepsCoordinatesThatTexturesLieOn) {
+  Threads threads;
+  std::string textured = kFurnace;
+  textured.replace(textured.find("\"metallicFactor\""), 0, R"("baseColorTexture":{"index":0,"texCoord":1},)");
+  const std::string texture = R"(,"textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,)" +
+                              test::base64(test::tiny_png()) + R"("}])";
+  const auto kept =
+      plan_json(input_of(glb_of(Room(beside), {.material = textured, .texture = texture}), kAlone), threads);
+  ASSERT_TRUE(kept) << kept.error().message;
+  const auto refused =
+      plan_json(input_of(glb_of(Room(on_each_other), {.material = textured, .texture = texture}), kAlone), threads);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "no_lightmap_coordinates");
+}
+
+TEST(LightmapBake, OfHostileCoordinatesIsALightmapOrAFault) {
+  Threads threads;
+  const auto plan = [&](const auto& fit) {
+    return plan_json(input_of(glb_of(Room(fit), {.material = kFurnace}), kAlone), threads);
+  };
+  const auto codes = [](const Result<std::string>& text) { return warning_codes(nlohmann::json::parse(*text)); };
+  const auto huge = plan([](int, float u, float v) { return std::array{3e37F * u, -3e37F * v}; });
+  ASSERT_TRUE(huge) << huge.error().message;
+  EXPECT_EQ(codes(huge)[0], "lightmap_charts_packed");
+  const auto dot = plan([](int, float, float) { return std::array{0.5F, 0.5F}; });
+  ASSERT_TRUE(dot) << dot.error().message;
+  EXPECT_EQ(codes(dot), nlohmann::json::array({"lightmap_charts_flat"}));
+  const auto line = plan([](int wall, float u, float) {
+    return std::array{0.1F + 0.8F * u, 0.1F * static_cast<float>(wall)};
+  });
+  ASSERT_TRUE(line) << line.error().message;
+  const auto none = plan([](int, float u, float) { return std::array{u, std::nanf("")}; });
+  ASSERT_FALSE(none);  // refused on import
+  EXPECT_EQ(none.error().code, "non_finite_geometry");
+}
+
+TEST(LightmapBake, MoreTexelsThanMemoryAllowsAreRefusedWithNumbers) {
+  Threads threads;
+  const auto refused = plan_json(
+      input_of(
+          glb_of(Room(beside), {.material = kFurnace}),
+          R"({"steps":[{"do":"radiosity","deliver":["lightmap"],"lightmap":{"size":4096}}],"limits":{"memory_mb":1024}})"),
+      threads);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "memory_limit");
+  EXPECT_NE(refused.error().message.find("/steps/0/lightmap/size"), std::string::npos);
+}
+
+TEST(PointsBake, OfAWhiteFurnaceIsOneEverywhereByTheBasisThatTheFileDescribes) {
+  Threads threads;
+  const auto output = bake(input_of(glb_of(Room(beside), {.material = kFurnace}),
+                                    R"({"steps":[{"do":"radiosity","deliver":["points"]}],"quality":"draft"})"),
+                           {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  const auto field = read_points(file(*output, "scene.glb"));
+  ASSERT_TRUE(field) << field.error().message;
+  EXPECT_EQ(report_of(*output)["points"]["levels"].back(), field->sites.size());
+  ASSERT_GT(field->sites.size(), 1000U);
+  const MeshlessBasis basis = basis_of(*field, threads);
+  for (std::uint32_t j = 0; j < basis.functions(); ++j) EXPECT_EQ(basis.radius(j), field->radius[j]);
+  // Walls of the unit cube; functions of a level add up to 1, so that what is left is the noise of light at points.
+  for (const SurfaceSite& p : {SurfaceSite{{0, -0.5F, 0}, {0, 1, 0}},
+                               {{0.31F, 0.5F, -0.2F}, {0, -1, 0}},
+                               {{0.5F, 0.49F, 0.49F}, {-1, 0, 0}}}) {
+    const Vec3f light = basis.evaluate(field->coefficients, p, basis.levels());
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(light[c], 1, 0.02F);
+  }
+}
+
+TEST(PointsBake, WithVerticesLeavesThemAsTheyAre) {
+  Threads threads;
+  const Bytes scene = glb_of(Room(beside), {.material = kFurnace});
+  const auto recipe = [](const std::string& deliver) {
+    return R"({"steps":[{"do":"radiosity","subdivide":{"triangles":200})" + deliver +
+           R"(}],"quality":"draft","certificate":false})";
+  };
+  const auto plain = bake(input_of(scene, recipe("")), {}, threads);
+  const auto both = bake(input_of(scene, recipe(R"(,"deliver":["vertices","points"])")), {}, threads);
+  ASSERT_TRUE(plain && both);
+  const auto a = read_baked_glb(file(*plain, "scene.glb")), b = read_baked_glb(file(*both, "scene.glb"));
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->transfer.coefficients, b->transfer.coefficients);
+}
+
+}  // namespace
+}  // namespace kiln
