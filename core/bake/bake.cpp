@@ -131,6 +131,7 @@ struct Pass {
   std::optional<LinksOutcome> links;
   std::optional<FieldOutcome> field;
   std::optional<GlossyReport> glossy;
+  std::optional<MeshlessOutcome> meshless;
 };
 
 /// What the steps that light the scene as `radiosity` does make besides.
@@ -207,6 +208,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   const NoiseProbes noise = std::move(transport.noise);
   pass.bounce_rays = transport.bounce_rays;
   pass.merge = transport.merge;
+  pass.meshless = transport.meshless;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   std::optional<LightFieldStage> stage;
   if (outgoing) {
@@ -387,6 +389,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .links = pass.links,
                                           .field = pass.field,
                                           .glossy = pass.glossy,
+                                          .meshless = pass.meshless,
                                           .passes = passes});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});

@@ -9,6 +9,7 @@
 #include "core/bake/forecast.h"
 #include "core/bake/glossy_plan.h"
 #include "core/bake/merge_plan.h"
+#include "core/bake/meshless_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
@@ -59,10 +60,11 @@ struct Plan {
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
   GlossyPlan glossy;
-  std::optional<Radiosity> radiosity;  // of the step `radiosity`; order is 0 then
-  std::optional<GridBake> grid;        // of the step `grid`; `radiosity` is there too
-  std::optional<LinkParams> links;     // of the step `transport`; `radiosity` is there too
-  std::optional<FieldPlan> field;      // of the step `lightfield`; `radiosity` is there too, unless carried
+  std::optional<MeshlessPlan> meshless;  // solver of the step `prt`
+  std::optional<Radiosity> radiosity;    // of the step `radiosity`; order is 0 then
+  std::optional<GridBake> grid;          // of the step `grid`; `radiosity` is there too
+  std::optional<LinkParams> links;       // of the step `transport`; `radiosity` is there too
+  std::optional<FieldPlan> field;        // of the step `lightfield`; `radiosity` is there too, unless carried
   std::vector<Decision> decisions;
   std::vector<Warning> warnings;  // what this plan does not honour; beside those of the scene
   PointCosts costs;

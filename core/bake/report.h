@@ -43,6 +43,7 @@ struct ReportInput {
   const std::optional<LinksOutcome>& links;
   const std::optional<FieldOutcome>& field;
   const std::optional<GlossyReport>& glossy;
+  const std::optional<MeshlessOutcome>& meshless;
   const Passes& passes;  // none where a quality was asked for
 };
 
