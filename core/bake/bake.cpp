@@ -56,14 +56,16 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + (1U 
 Result<void> check_memory(const Plan& plan, const Limits& limits) {
   const bool carried = plan.field && plan.field->carried;
   if (plan.prediction.memory_bytes <= limits.memory_mb << 20) return {};
-  return fault("memory_limit",
-               "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
-                   " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
-                   (carried          ? "give the file fewer vertices"
-                    : plan.grid      ? "lower /steps/0/resolution"
-                    : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
-                                     : "lower /steps/0/subdivide/triangles or /steps/0/order") +
-                   ", or raise the limit");
+  return fault(
+      "memory_limit",
+      "the bake would need about " + megabytes(plan.prediction.memory_bytes) + " and limits.memory_mb allows " +
+          std::to_string(limits.memory_mb) + " MB; " +
+          (carried          ? "give the file fewer vertices"
+           : plan.grid      ? "lower /steps/0/resolution"
+           : plan.meshless  ? "raise /steps/0/points/radius, lower /steps/0/subdivide/triangles or /steps/0/order"
+           : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
+                            : "lower /steps/0/subdivide/triangles or /steps/0/order") +
+          ", or raise the limit");
 }
 
 /// The baked scene before it is written: transport, the job's light, and an exposure that suits both.

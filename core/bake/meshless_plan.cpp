@@ -10,6 +10,8 @@ namespace kiln {
 namespace {
 
 constexpr double kFewest = 512, kMost = 262144;
+constexpr double kMatrixShare =
+    0.3;  // points over vertices: with those that see no point at most a third have matrices
 
 /// What the recipe leaves open follows from the number of points that is wanted.
 PointPlacement placed(const MeshlessPlan& plan, const Scene& scene, std::vector<bool> parts, double wanted) {
@@ -21,13 +23,13 @@ PointPlacement placed(const MeshlessPlan& plan, const Scene& scene, std::vector<
 
 }  // namespace
 
-PointPlacement sweep_points(const MeshlessPlan& plan, const Scene& scene) {
-  return placed(plan, scene, {}, 0.5 * static_cast<double>(scene.mesh.position.size()));
+PointPlacement sweep_points(const MeshlessPlan& plan, const Scene& scene, double vertices) {
+  return placed(plan, scene, {}, vertices / 2);
 }
 
 PointPlacement matrix_points(const MeshlessPlan& plan, const Scene& scene, const std::vector<bool>& parts,
-                             std::size_t vertices) {
-  return placed(plan, scene, parts, static_cast<double>(vertices) / 3);
+                             double vertices) {
+  return placed(plan, scene, parts, kMatrixShare * vertices);
 }
 
 void plan_meshless(Plan& plan, const Scene& scene, const PrtStep& step, const Effort& effort) {

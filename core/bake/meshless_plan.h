@@ -27,10 +27,10 @@ struct PrtStep;
 /// Decides on it where the step asks for it.
 void plan_meshless(Plan&, const Scene&, const PrtStep&, const Effort&);
 
-/// Points for reflected light on all of a scene: half as many as its vertices.
-PointPlacement sweep_points(const MeshlessPlan&, const Scene&);
-/// Points for the matrices of so many vertices on some parts: a third as many.
-PointPlacement matrix_points(const MeshlessPlan&, const Scene&, const std::vector<bool>& parts, std::size_t vertices);
+/// Points for reflected light on all of a scene: half as many as it has, or will have, vertices.
+PointPlacement sweep_points(const MeshlessPlan&, const Scene&, double vertices);
+/// Points for the matrices of so many vertices on some parts: three tenths as many.
+PointPlacement matrix_points(const MeshlessPlan&, const Scene&, const std::vector<bool>& parts, double vertices);
 
 /// Seconds by what they went into; what begins several times adds up.
 class StageClock {

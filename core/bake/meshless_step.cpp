@@ -32,9 +32,10 @@ SweptTransfer sweep_on_points(const MeshlessWork& work, const std::vector<float>
   DirectTransfer rays = sky_rays(work.tracer, plan, work.band_power, work.seed, work.threads);
   rays.samples = std::max(16, rays.samples / kRoughRays);
   rays.band_power.assign(work.band_power.begin(), work.band_power.end());
+  const auto vertices = static_cast<double>(work.tracer.scene().mesh.position.size());
   StageClock& clock = work.outcome.sweep_clock;
   TransferSweeps params{.bounces = plan.bounces,
-                        .points = sweep_points(*plan.meshless, work.tracer.scene()),
+                        .points = sweep_points(*plan.meshless, work.tracer.scene(), vertices),
                         .sky = rays,
                         .lamp_samples = std::max(16, plan.lamp_samples / kRoughRays),
                         .rays = plan.bounce_samples,
@@ -57,11 +58,11 @@ SweptTransfer sweep_on_points(const MeshlessWork& work, const std::vector<float>
 GlossyBaked matrices_on_points(const MeshlessWork& work, const Transfer& light, std::span<const std::uint32_t> vertices,
                                GlossyBake bake) {
   StageClock& clock = work.outcome.matrix_clock;
-  GlossyPoints params{
-      .bake = std::move(bake),
-      .points = matrix_points(*work.plan.meshless, work.tracer.scene(), work.plan.glossy.parts, vertices.size()),
-      .eps = work.plan.meshless->eps_transfer,
-      .stage = [&](std::string_view stage) { clock.begin(stage); }};
+  GlossyPoints params{.bake = std::move(bake),
+                      .points = matrix_points(*work.plan.meshless, work.tracer.scene(), work.plan.glossy.parts,
+                                              static_cast<double>(vertices.size())),
+                      .eps = work.plan.meshless->eps_transfer,
+                      .stage = [&](std::string_view stage) { clock.begin(stage); }};
   params.points.seed = work.seed;
   GlossyPointStats stats;
   GlossyBaked out = bake_glossy_on_points(work.tracer, light, vertices, params, work.threads, stats);

@@ -168,6 +168,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"draft"})"},
       {"prt-final", "The same, for delivery",
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"final"})"},
+      {"glossy", "The same with what every surface mirrors, by transfer matrices at points where they change",
+       R"({"steps":[{"do":"prt","glossy":"on","solver":"meshless"}],"environment":{"builtin":"clear"}})"},
       {"overcast", "Relightable diffuse light under an overcast sky",
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"overcast"}})"},
       {"radiosity", "Light of one job, all reflections, under a clear sky with sun: not relightable, small and quick",
