@@ -5,15 +5,9 @@
 
 #include "core/base/expects.h"
 #include "core/prt/hidden.h"
-#include "core/prt/interreflection.h"
 
 namespace kiln {
 namespace {
-
-DirectTransfer rough(DirectTransfer sky) {
-  sky.samples = std::max(16, sky.samples / kRoughRays);
-  return sky;
-}
 
 /// Of the constant band at points.
 double mean_constant_band(const Tracer& tracer, const std::vector<TransferPoint>& points, std::uint64_t seed,
@@ -22,6 +16,13 @@ double mean_constant_band(const Tracer& tracer, const std::vector<TransferPoint>
   double sum = 0;
   for (const float t : bake_direct_transfer(tracer, points, {.order = 1, .samples = kPilot, .seed = seed}, threads))
     sum += t;
+  return points.empty() ? 0 : sum / static_cast<double>(points.size());
+}
+
+double mean_lamp_light(const Tracer& tracer, const std::vector<TransferPoint>& points, const FixedDirect& lamps,
+                       Threads& threads) {
+  double sum = 0;
+  for (const Vec3f& x : bake_fixed_direct(tracer, points, lamps, threads)) sum += (double{x.x} + x.y + x.z) / 3;
   return points.empty() ? 0 : sum / static_cast<double>(points.size());
 }
 
@@ -34,39 +35,51 @@ std::vector<TransferPoint> spread_points(const Mesh& mesh) {
   return some;
 }
 
-DirectTransfer sky_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
-                        std::uint64_t seed, Threads& threads) {
-  DirectTransfer out{.order = plan.order, .samples = plan.samples, .seed = seed};
+TransferRays transfer_rays(const Tracer& tracer, const Plan& plan, const std::vector<double>& band_power,
+                           std::uint64_t seed, Threads& threads) {
+  TransferRays out{.sky = {.order = plan.order, .samples = plan.samples, .seed = seed},
+                   .lamps = {.samples = plan.lamp_samples, .seed = seed}};
   if (!(plan.noise > 0)) return out;
-  const double mean =
-      2 * std::sqrt(M_PI) * mean_constant_band(tracer, spread_points(tracer.scene().mesh), seed, threads);
-  // Interpolation halves the variance of what vertices have.
-  out.tolerance = static_cast<float>(std::sqrt(2.0) * plan.noise * std::max(mean, 0.01));
-  for (const double p : band_power) out.band_power.push_back(static_cast<float>(p));
+  const std::vector<TransferPoint> points = spread_points(tracer.scene().mesh);
+  const double sky = 2 * std::sqrt(M_PI) * mean_constant_band(tracer, points, seed, threads);
+  const double noise = std::sqrt(2.0) * plan.noise;  // interpolation halves the variance of what vertices have
+  out.sky.tolerance = static_cast<float>(noise * std::max(sky, 0.01));
+  for (const double p : band_power) out.sky.band_power.push_back(static_cast<float>(p));
+  if (!plan.lamps) return out;
+  constexpr int kReach = 16;    // the damaged helmet: noise .61 without it, .02 to .05 with it
+  constexpr double kLarge = 8;  // below it more rays for all points, not for a few, would lower the noise
+  const double lamps = mean_lamp_light(tracer, points, out.lamps, threads);
+  out.lamps.samples = (plan.lamp_samples + 15) / 16 * 16;
+  out.lamps.reach = std::min(kReach, 65536 / out.lamps.samples);
+  out.lamps.tolerance = static_cast<float>(kLarge * noise * lamps);
   return out;
 }
 
-DirectSource::DirectSource(const Tracer& tracer, const Plan& plan, const DirectTransfer& sky,
+TransferRays rough(TransferRays rays) {
+  rays.sky.samples = std::max(16, rays.sky.samples / kRoughRays);
+  rays.lamps.samples = std::max(16, rays.lamps.samples / kRoughRays / 16 * 16);
+  return rays;
+}
+
+DirectSource::DirectSource(const Tracer& tracer, const Plan& plan, const TransferRays& rays,
                            const std::vector<double>& band_power, BakeLog& log, Threads& threads)
     : tracer_(tracer),
       plan_(plan),
       log_(log),
       threads_(threads),
-      seed_(sky.seed),
-      sky_(tracer, sky),
-      rough_sky_(tracer, rough(sky)),
+      lamps_(rays.lamps),
+      rough_lamps_(rough(rays).lamps),
+      sky_(tracer, rays.sky),
+      rough_sky_(tracer, rough(rays).sky),
       scale_(measure_scale(band_power)) {}
 
 ValueSource DirectSource::source() {
   ValueSource s{
       .width = width(),
-      .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, plan_.lamp_samples); },
+      .values = [this](std::span<const TransferPoint> batch) { return light(batch, sky_, lamps_); },
       .bounded = {lamp_columns()},
       .hidden = hidden_test(tracer_),
-      .rough =
-          [this](std::span<const TransferPoint> batch) {
-            return light(batch, rough_sky_, std::max(16, plan_.lamp_samples / kRoughRays));
-          }};
+      .rough = [this](std::span<const TransferPoint> batch) { return light(batch, rough_sky_, rough_lamps_); }};
   if (plan_.lamps) s.bounded.insert(s.bounded.end(), {0, 1, 2});
   return s;
 }
@@ -77,13 +90,12 @@ std::vector<float> DirectSource::measure_scale(const std::vector<double>& band_p
   const std::vector<TransferPoint> points = spread_points(tracer_.scene().mesh);
   std::vector<float> scale(width(), 1.0F);
   if (plan_.lamps) {
-    double mean = 0;
-    for (const Vec3f& x : bake_fixed_direct(tracer_, points, {.samples = plan_.lamp_samples, .seed = seed_}, threads_))
-      mean += (double{x.x} + x.y + x.z) / (3.0 * static_cast<double>(points.size()));
+    const double mean =
+        mean_lamp_light(tracer_, points, {.samples = plan_.lamp_samples, .seed = lamps_.seed}, threads_);
     if (mean > 1e-30 && mean < 1e30) std::fill_n(scale.begin(), 3, static_cast<float>(kOpenConstantBand / mean));
   }
   if (plan_.subdivide.measure != SplitMeasure::residual) return scale;
-  const double mean = mean_constant_band(tracer_, points, seed_, threads_);
+  const double mean = mean_constant_band(tracer_, points, lamps_.seed, threads_);
   const double constant = kOpenConstantBand / std::max(mean, kFaint * kOpenConstantBand);
   for (int l = 0; l < plan_.order; ++l) {
     const double band = constant * std::sqrt(band_power[static_cast<std::size_t>(l)] / band_power[0]);
@@ -94,12 +106,12 @@ std::vector<float> DirectSource::measure_scale(const std::vector<double>& band_p
 }
 
 std::vector<float> DirectSource::light(std::span<const TransferPoint> batch, const DirectTransferBaker& baker,
-                                       int lamp_samples) {
+                                       const FixedDirect& lamps) {
   points_ += batch.size();
   log_.advance(std::min(points_, expected_points()), expected_points());
   const std::vector<float> sky = baker.bake(batch, threads_, &stats_);
   if (!plan_.lamps) return join(sky, {});
-  return join(sky, bake_fixed_direct(tracer_, batch, {.samples = lamp_samples, .seed = seed_}, threads_, &stats_));
+  return join(sky, bake_fixed_direct(tracer_, batch, lamps, threads_, &stats_));
 }
 
 std::vector<float> DirectSource::join(const std::vector<float>& sky, const std::vector<Vec3f>& lamps) const {

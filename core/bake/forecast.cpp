@@ -189,8 +189,8 @@ PointCosts measure_costs(const Tracer& tracer, const Plan& plan, Threads& thread
   const std::vector<TransferPoint> points = pilot_points(tracer.scene());
   if (points.empty()) return out;
   const auto n = static_cast<double>(points.size());
-  const DirectTransfer rays = sky_rays(tracer, plan, band_power(plan.order, {}), kSeed, threads);
-  const DirectTransferBaker sky(tracer, rays);
+  const TransferRays rays = transfer_rays(tracer, plan, band_power(plan.order, {}), kSeed, threads);
+  const DirectTransferBaker sky(tracer, rays.sky);
   TransferStats stats;
   std::vector<float> values;
   out.sky_seconds = seconds_of([&] { values = sky.bake(points, threads, &stats); }) / n;
@@ -206,8 +206,7 @@ PointCosts measure_costs(const Tracer& tracer, const Plan& plan, Threads& thread
     out.sky_light += 2 * std::sqrt(M_PI) * values[p * static_cast<std::size_t>(sh_count(plan.order))] / n;
   if (!plan.lamps) return out;
   stats = {};
-  const FixedDirect lamps{.samples = plan.lamp_samples, .seed = kSeed};
-  out.lamp_seconds = seconds_of([&] { bake_fixed_direct(tracer, points, lamps, threads, &stats); }) / n;
+  out.lamp_seconds = seconds_of([&] { bake_fixed_direct(tracer, points, rays.lamps, threads, &stats); }) / n;
   out.lamp_rays = static_cast<double>(stats.rays) / n;
   return out;
 }

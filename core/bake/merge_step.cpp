@@ -19,23 +19,20 @@ constexpr double kFaint = 0.05;                 // of an open point, as in direc
 constexpr float kUnit = 1 / kOpenConstantBand;  // coefficient of 1: products of degree 0 count Y_00^2
 
 /// Light at the vertices by few rays.
-Transfer draw_transfer(const Tracer& tracer, const Plan& plan, DirectTransfer rays, BakeLog& log, Threads& threads) {
+Transfer draw_transfer(const Tracer& tracer, const Plan& plan, const TransferRays& rays, BakeLog& log,
+                       Threads& threads) {
   const Mesh& mesh = tracer.scene().mesh;
   const std::vector<TransferPoint> points = vertex_points(mesh);
   const auto few = [](int samples) { return std::max(16, samples / kRoughRays); };
   TransferStats stats;
-  rays.samples = few(plan.samples);
-  std::vector<float> sky = bake_direct_transfer(tracer, points, rays, threads, &stats);
+  std::vector<float> sky = bake_direct_transfer(tracer, points, rays.sky, threads, &stats);
   std::vector<Vec3f> lamps;
-  if (plan.lamps) {
-    const FixedDirect shadow_rays{.samples = few(plan.lamp_samples), .seed = rays.seed};
-    lamps = bake_fixed_direct(tracer, points, shadow_rays, threads, &stats);
-  }
+  if (plan.lamps) lamps = bake_fixed_direct(tracer, points, rays.lamps, threads, &stats);
   Transfer out = bake_interreflection(tracer, mesh, std::move(sky), std::move(lamps),
                                       {.order = plan.order,
                                        .bounces = std::min(plan.bounces, kMergeReflections),
                                        .samples = few(plan.bounce_samples),
-                                       .seed = rays.seed},
+                                       .seed = rays.sky.seed},
                                       threads, &stats);
   log.count_rays(stats.rays);
   return out;
@@ -208,10 +205,10 @@ MergeOutcome merge_scene(Scene& scene, Plan& plan, const std::vector<double>& ba
   LitMesh lit{.mesh = scene.mesh, .field = {}};
   {
     const Tracer tracer(scene, threads);
-    DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
+    TransferRays rays = rough(transfer_rays(tracer, plan, band_power, seed, threads));
     std::array<Transfer, 2> draw;
     for (Transfer& one : draw) {
-      rays.seed = mix64(rays.seed ^ 0x6d65726765ULL);
+      rays.sky.seed = rays.lamps.seed = mix64(rays.sky.seed ^ 0x6d65726765ULL);
       one = draw_transfer(tracer, plan, rays, log, threads);
     }
     lit.field = field_of(scene, plan, draw, scale_of(scene.mesh, draw[0], band_power));

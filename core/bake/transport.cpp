@@ -65,16 +65,16 @@ std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::ui
 
 /// Direct light in two independent draws: the second minus the first, shaped as Probes.
 std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPoint>& points, const Plan& plan,
-                              const DirectTransfer& rays, Threads& threads) {
+                              const TransferRays& rays, Threads& threads) {
   const auto bands = static_cast<std::size_t>(sh_count(plan.order)), slots = bands + (plan.lamps ? 1 : 0);
   std::vector<float> out(points.size() * 3 * slots, 0.0F);
   for (const float sign : {-1.0F, 1.0F}) {
-    const std::uint64_t draw = sign < 0 ? rays.seed : mix64(rays.seed ^ 0x6e6f697365ULL);
-    DirectTransfer redrawn = rays;
-    redrawn.seed = draw;
-    const std::vector<float> sky = bake_direct_transfer(tracer, points, redrawn, threads);
+    const std::uint64_t draw = sign < 0 ? rays.sky.seed : mix64(rays.sky.seed ^ 0x6e6f697365ULL);
+    TransferRays redrawn = rays;
+    redrawn.sky.seed = redrawn.lamps.seed = draw;
+    const std::vector<float> sky = bake_direct_transfer(tracer, points, redrawn.sky, threads);
     std::vector<Vec3f> lamps(points.size());
-    if (plan.lamps) lamps = bake_fixed_direct(tracer, points, {.samples = plan.lamp_samples, .seed = draw}, threads);
+    if (plan.lamps) lamps = bake_fixed_direct(tracer, points, redrawn.lamps, threads);
     for (std::size_t p = 0; p < points.size(); ++p) {
       for (std::size_t c = 0; c < 3; ++c) {
         float* to = out.data() + (3 * p + c) * slots;
@@ -180,7 +180,7 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
   log.begin("transfer", 0.55);
   Mesh refined = [&] {
     const Tracer tracer(scene, threads);
-    const DirectTransfer rays = sky_rays(tracer, plan, band_power, seed, threads);
+    const TransferRays rays = transfer_rays(tracer, plan, band_power, seed, threads);
     DirectSource source(tracer, plan, rays, band_power, log, threads);
     Subdivided direct = bake_direct(tracer, plan, source, threads);
     source.separate(direct.values, sky, lamps);

@@ -37,8 +37,7 @@ Vec3f DirectLight::at(const Receiver& to, std::uint64_t seed, std::uint64_t& ray
     if (flat_) {
       light += flat_->light_at(to, lamps, seed, rays);
     } else {
-      light += lamps_.emitted(to, lamps.many, seed);
-      rays += static_cast<std::uint64_t>(lamps.many + cosine_share(lamps.many));
+      light += lamps_.emitted(to, {.samples = lamps.many}, seed, rays);
     }
   }
   if (sky_ != nullptr) light += sky_at(to, mix64(~seed), rays);

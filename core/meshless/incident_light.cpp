@@ -17,7 +17,7 @@ constexpr int kBrightSets = 64;
 }  // namespace
 
 IncidentLight::IncidentLight(const World& world, const Rays& own, std::uint64_t seed)
-    : world_(world), own_(own), seed_(seed), emitters_(world.tracer.scene()) {
+    : world_(world), own_(own), seed_(seed), emitters_(world.tracer.emitters()) {
   if (!own.direct || world.sky == nullptr) return;
   EnvironmentSampler sampler(*world.sky);
   if (sampler.useful()) bright_ = std::move(sampler);

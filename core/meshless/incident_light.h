@@ -81,7 +81,7 @@ class IncidentLight {
   World world_;
   Rays own_;
   std::uint64_t seed_;
-  EmitterSampler emitters_;
+  const EmitterSampler& emitters_;
   std::optional<EnvironmentSampler> bright_;  // of a map that has brighter and darker parts
   std::vector<BrightRay> bright_rays_;        // kBrightSets sets of own_.count rays; a place takes one by hash
   std::optional<Environment> blurred_;        // what rays see of the sky, averaged

@@ -59,6 +59,8 @@ void limit_transfer(const Transfer& shape, float* row);
 struct FixedDirect {
   int samples = 256;  // shadow rays per point over all emitters; one per punctual light besides
   std::uint64_t seed = 0;
+  int reach = 1;        // at most so many times as many where the error is likely above the tolerance (lamps.h)
+  float tolerance = 0;  // of the value
 };
 std::vector<Vec3f> bake_fixed_direct(const Tracer&, std::span<const TransferPoint>, const FixedDirect&, Threads&,
                                      TransferStats* stats = nullptr);

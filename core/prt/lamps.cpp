@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -18,6 +20,8 @@ constexpr double kShortfall = 1 - 4e-6;  // a shadow ray ends this fraction befo
 bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
 }
+
+constexpr double kLeft = 0.7;  // as of transfer vectors: halves of a stratified set differ by their own errors
 
 void set_lane(Rays16& rays, std::size_t i, const Vec3d& direction, double far) {
   const Vec3f w = to_float(direction);
@@ -46,17 +50,31 @@ Vec3f Lamps::punctual(const Receiver& at, const Light& light) const {
   return to_float(arrival.irradiance * (cosine * kInversePi));
 }
 
-Vec3f Lamps::emitted(const Receiver& at, int samples, std::uint64_t seed) const {
+Vec3f Lamps::emitted(const Receiver& at, const EmitterRays& wanted, std::uint64_t seed, std::uint64_t& rays) const {
   if (emitters_.empty()) return {};
-  const Shares shares{static_cast<double>(samples), static_cast<double>(cosine_share(samples))};
-  return to_float(from_points(at, shares, mix64(seed)) + from_rays(at, shares, mix64(seed + 1)));
+  EXPECTS(wanted.reach == 1 || wanted.samples % 16 == 0);
+  const int most = wanted.samples * wanted.reach;
+  const double cosine = static_cast<double>(cosine_share(wanted.samples)) / wanted.samples;
+  Vec3d sum, mean;
+  double change = 0;  // squared, of the mean; the last round's, or a half of the one before
+  int done = 0;
+  for (int end = wanted.reach > 1 ? wanted.samples / 4 : most; done < most; end = std::min(2 * end, most)) {
+    sum += from_points(at, {done, end, cosine}, mix64(seed)) +
+           from_rays(at, {cosine_share(done), cosine_share(end), cosine}, mix64(seed + 1));
+    const Vec3d step = sum / end - std::exchange(mean, sum / end);
+    change = done == 0 ? 0 : std::max(dot(step, step), change / 4);
+    done = end;
+    if (done >= wanted.samples && kLeft * change / 3 <= wanted.tolerance * wanted.tolerance) break;
+  }
+  rays += static_cast<std::uint64_t>(done + cosine_share(done));
+  return to_float(mean);
 }
 
-Vec3d Lamps::from_points(const Receiver& at, const Shares& shares, std::uint64_t seed) const {
+Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t seed) const {
   const Vec3d origin = to_double(at.origin), normal = to_double(at.normal);
   Vec3d sum;
-  for (int first = 0; first < static_cast<int>(shares.area); first += kPacket) {
-    const int count = std::min(kPacket, static_cast<int>(shares.area) - first);
+  for (int first = round.first; first < round.last; first += kPacket) {
+    const int count = std::min(kPacket, round.last - first);
     Rays16 rays;
     set_origin(rays, at.origin);
     std::array<Vec3d, kPacket> light{};
@@ -72,7 +90,7 @@ Vec3d Lamps::from_points(const Receiver& at, const Shares& shares, std::uint64_t
       const double cosine = dot(w, normal), facing = s.double_sided ? std::abs(dot(w, s.normal)) : -dot(w, s.normal);
       if (cosine <= 0 || facing <= 0) continue;
       const double solid_density = s.density * distance * distance / facing;
-      const double weight = cosine * kInversePi / (shares.area * solid_density + shares.cosine * cosine * kInversePi);
+      const double weight = cosine * kInversePi / (solid_density + round.cosine * cosine * kInversePi);
       light[static_cast<std::size_t>(i)] = s.radiance * weight;
     }
     const std::uint32_t hidden = tracer_.occluded16(rays, count);
@@ -83,11 +101,11 @@ Vec3d Lamps::from_points(const Receiver& at, const Shares& shares, std::uint64_t
   return sum;
 }
 
-Vec3d Lamps::from_rays(const Receiver& at, const Shares& shares, std::uint64_t seed) const {
+Vec3d Lamps::from_rays(const Receiver& at, const Round& round, std::uint64_t seed) const {
   const Basis<float> basis = basis_around(at.normal);
   Vec3d sum;
-  for (int first = 0; first < static_cast<int>(shares.cosine); first += kPacket) {
-    const int count = std::min(kPacket, static_cast<int>(shares.cosine) - first);
+  for (int first = round.first; first < round.last; first += kPacket) {
+    const int count = std::min(kPacket, round.last - first);
     Rays16 rays;
     set_origin(rays, at.origin);
     std::array<Vec3f, kPacket> local;
@@ -107,7 +125,7 @@ Vec3d Lamps::from_rays(const Receiver& at, const Shares& shares, std::uint64_t s
       const double facing = std::abs(dot(w, p.geometric_normal));
       const double solid_density = density * hits.t[i] * hits.t[i] / std::max(facing, 1e-12);
       const double cosine = local[i].z * kInversePi;
-      const double weight = cosine / (shares.area * solid_density + shares.cosine * cosine);
+      const double weight = cosine / (solid_density + round.cosine * cosine);
       sum += to_double(emission(hits.triangle[i], hits.u[i], hits.v[i], w)) * weight;
     }
   }

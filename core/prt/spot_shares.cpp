@@ -40,12 +40,13 @@ SpotShares::SpotShares(const BrightSpots& spots, const Lamps& lamps, const Mesh&
   }
   std::ranges::sort(near);
   near.erase(std::unique(near.begin(), near.end()), near.end());
+  std::uint64_t rays = 0;
   for (const auto& [v, k] : near) {
     const TransferPoint p = point_of(v);
     const Receiver at{ray_origin(p), p.normal};
     const Vec3f own = lamps.punctual(at, *spots.lamps()[k].light);
     if (own == Vec3f{}) continue;
-    const Vec3f all = lamps.punctual(at) + lamps.emitted(at, kEmitterSamples, v);
+    const Vec3f all = lamps.punctual(at) + lamps.emitted(at, {.samples = kEmitterSamples}, v, rays);
     shares_.push_back({v, k, ratio(own, all)});
   }
   if (shares_.empty()) return;

@@ -7,7 +7,6 @@
 namespace kiln {
 namespace {
 
-/// IEC 61966-2-1.
 std::array<float, 256> srgb_table() {
   std::array<float, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -51,11 +50,10 @@ struct Sampler {
   bool srgb;
 
   Vec4f texel(int x, int y) const {
-    static const std::array<float, 256> kLinear = srgb_table();
     const auto row = static_cast<std::size_t>(wrapped(y, image.height, texture.wrap_v));
     const auto column = static_cast<std::size_t>(wrapped(x, image.width, texture.wrap_u));
     const std::uint8_t* p = image.rgba.data() + 4 * (row * static_cast<std::size_t>(image.width) + column);
-    const auto colour = [&](int c) { return srgb ? kLinear[p[c]] : static_cast<float>(p[c]) / 255; };
+    const auto colour = [&](int c) { return srgb ? linear_of_srgb(p[c]) : static_cast<float>(p[c]) / 255; };
     return {colour(0), colour(1), colour(2), static_cast<float>(p[3]) / 255};
   }
 
@@ -72,6 +70,11 @@ struct Sampler {
 };
 
 }  // namespace
+
+float linear_of_srgb(std::uint8_t stored) {
+  static const std::array<float, 256> kLinear = srgb_table();
+  return kLinear[stored];
+}
 
 Vec4f sample_texture(const Scene& scene, const TextureRef& ref, const Vec2f& uv, bool srgb) {
   constexpr Vec4f kWhite{1, 1, 1, 1};

@@ -9,4 +9,7 @@ namespace kiln {
 /// absent.
 Vec4f sample_texture(const Scene&, const TextureRef&, const Vec2f& uv, bool srgb);
 
+/// A channel of an 8-bit texel, sRGB decoded (IEC 61966-2-1): [0, 1].
+float linear_of_srgb(std::uint8_t);
+
 }  // namespace kiln

@@ -58,7 +58,7 @@ PathVertex vertex_after(const PathVertex& from, const Vec3d& position, const Vec
 Vec3f lifted(const PathVertex& v) { return offset_origin(to_float(v.position), to_float(side_of(v))); }
 
 LampLight::LampLight(const Tracer& tracer, std::span<const Light> lamps, bool scene_lights)
-    : tracer_(tracer), scene_(tracer.scene()), own_(lamps), scene_lights_(scene_lights), emitters_(tracer.scene()) {
+    : tracer_(tracer), scene_(tracer.scene()), own_(lamps), scene_lights_(scene_lights), emitters_(tracer.emitters()) {
   choose_senders();
 }
 

@@ -86,7 +86,7 @@ class LampLight {
   const Scene& scene_;
   std::span<const Light> own_;
   bool scene_lights_;
-  EmitterSampler emitters_;
+  const EmitterSampler& emitters_;
   std::vector<Sender> senders_;
   bool has_beams_ = false;
 };

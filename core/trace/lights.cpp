@@ -4,10 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
 #include "core/sphere/sampling.h"
+#include "core/trace/brightness_table.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -35,6 +37,43 @@ double strength(const Material& material) {
   const Vec3f& e = material.emission;
   return double{e.x} + double{e.y} + double{e.z};
 }
+
+/// Red, green and blue of the emission, about its mean over a triangle: 0 only where nothing of it emits.
+class Strength {
+ public:
+  explicit Strength(const Scene& scene) : scene_(scene), tables_(scene.images.size()) {}
+
+  double of(std::uint32_t triangle) {
+    const Material& material = material_of(scene_, triangle);
+    const double factor = strength(material);
+    const TextureRef& ref = material.emission_texture;
+    const int image =
+        factor > 0 && ref.texture >= 0 ? scene_.textures[static_cast<std::size_t>(ref.texture)].image : -1;
+    if (image < 0 || scene_.images[static_cast<std::size_t>(image)].rgba.empty()) return factor;
+    std::optional<BrightnessTable>& table = tables_[static_cast<std::size_t>(image)];
+    if (!table) table.emplace(scene_.images[static_cast<std::size_t>(image)]);
+    return factor * brightness(triangle, ref, *table);
+  }
+
+ private:
+  double brightness(std::uint32_t triangle, const TextureRef& ref, const BrightnessTable& table) const {
+    const std::vector<Vec2f>& uv = ref.uv_set == 1 ? scene_.mesh.uv1 : scene_.mesh.uv0;
+    const auto& m = ref.transform;
+    std::array<Vec2d, 3> corners;
+    double largest = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec2f at = uv.empty() ? Vec2f{} : uv[scene_.mesh.triangles[triangle][k]];
+      corners[k] = {double{m[0]} * at.x + double{m[1]} * at.y + m[2], double{m[3]} * at.x + double{m[4]} * at.y + m[5]};
+      largest = std::max({largest, std::abs(double{m[0]} * at.x) + std::abs(double{m[1]} * at.y),
+                          std::abs(double{m[3]} * at.x) + std::abs(double{m[4]} * at.y)});
+    }
+    constexpr double kRounding = 8 * 0x1p-24;  // of coordinates that are interpolated in float, relative
+    return table.mean(corners, kRounding * largest, scene_.textures[static_cast<std::size_t>(ref.texture)]);
+  }
+
+  const Scene& scene_;
+  std::vector<std::optional<BrightnessTable>> tables_;  // of each image, where an emitter asks for it
+};
 
 }  // namespace
 
@@ -67,8 +106,11 @@ double beam_density(const Light& light, const Vec3d& from_light) {
 }
 
 EmitterSampler::EmitterSampler(const Scene& scene) : scene_(scene) {
+  if (std::ranges::none_of(scene.materials, [](const Material& m) { return strength(m) > 0; })) return;
+  Strength strengths(scene);
   for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
-    const double power = strength(material_of(scene, t)) * triangle_area(scene.mesh, scene.mesh.triangles[t]);
+    strength_.push_back(static_cast<float>(strengths.of(t)));
+    const double power = double{strength_.back()} * triangle_area(scene.mesh, scene.mesh.triangles[t]);
     if (power <= 0) continue;
     total_ += power;
     triangles_.push_back(t);
@@ -90,7 +132,7 @@ EmitterSample EmitterSampler::sample(double pick, const Vec2<double>& u) const {
 }
 
 double EmitterSampler::density(std::uint32_t triangle) const {
-  return total_ > 0 ? strength(material_of(scene_, triangle)) / total_ : 0;
+  return total_ > 0 ? double{strength_[triangle]} / total_ : 0;
 }
 
 }  // namespace kiln

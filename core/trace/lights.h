@@ -35,15 +35,15 @@ struct EmitterSample {
   double density = 0;  // of this point, per area
 };
 
-/// Emissive triangles, chosen by area times the strength of their material's emission factor (textures do not count:
-/// no texel can be missed), and points uniform on them.
+/// Emissive triangles, chosen by area times the strength of their material's emission factor, times how bright its
+/// texture is there (core/trace/brightness_table.h: no texel is missed), and points uniform on them.
 class EmitterSampler {
  public:
   /// Keeps a reference to the scene.
   explicit EmitterSampler(const Scene&);
 
   bool empty() const { return triangles_.empty(); }
-  /// Sum over the emitters of area times red, green and blue of the emission factor.
+  /// Sum over the emitters of area times strength: red, green and blue of the emission, about its mean.
   double total_strength() const { return total_; }
   /// `pick` and `u` are uniform in [0, 1). Not for an empty sampler.
   EmitterSample sample(double pick, const Vec2<double>& u) const;
@@ -54,6 +54,7 @@ class EmitterSampler {
   const Scene& scene_;
   std::vector<std::uint32_t> triangles_;
   std::vector<double> cumulative_;
+  std::vector<float> strength_;  // of each triangle of the mesh; empty without emitters
   double total_ = 0;
 };
 

@@ -13,6 +13,7 @@
 
 #include "core/base/expects.h"
 #include "core/mesh/topology.h"
+#include "core/trace/lights.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -145,8 +146,9 @@ struct Tracer::Device {
   RTCBuffer positions = nullptr;
   RTCScene world = nullptr;
   std::array<Selection, 2> selections;  // 0: stops every ray, 1: asks the material
+  EmitterSampler emitters;
 
-  explicit Device(const Scene& s) : scene(s), selections{Selection{{}, &s}, Selection{{}, &s}} {}
+  explicit Device(const Scene& s) : scene(s), selections{Selection{{}, &s}, Selection{{}, &s}}, emitters(s) {}
   ~Device() {
     if (world) rtcReleaseScene(world);
     if (positions) rtcReleaseBuffer(positions);
@@ -229,6 +231,8 @@ Tracer::Tracer(const Scene& scene, Threads& threads) : device_(std::make_unique<
 Tracer::~Tracer() = default;
 
 const Scene& Tracer::scene() const { return device_->scene; }
+
+const EmitterSampler& Tracer::emitters() const { return device_->emitters; }
 
 std::uint32_t Tracer::occluded16(const Rays16& rays, int count) const {
   RTCRay16 ray;

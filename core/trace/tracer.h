@@ -42,6 +42,8 @@ struct Hit {
 /// jump over a neighbour 1e-5 away (Waechter and Binder 2019, whose steps the unit cube turns into one length, 1.9e-6).
 Vec3f offset_origin(const Vec3f& point, const Vec3f& n);
 
+class EmitterSampler;
+
 class Tracer {
  public:
   /// Keeps a reference to the scene, which must outlive it and not change.
@@ -58,6 +60,8 @@ class Tracer {
   Hit closest(const Vec3f& origin, const Vec3f& direction, float far) const;
 
   const Scene& scene() const;
+  /// Of the scene's emissive triangles (core/trace/lights.h), made once.
+  const EmitterSampler& emitters() const;
 
  private:
   struct Device;

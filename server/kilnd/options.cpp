@@ -46,7 +46,7 @@ void add_options(CLI::App& app, DaemonOptions& options, RawOptions& raw) {
   add(app, "--threads", options.service.threads, "threads of one worker; 0 shares the machine among the workers")
       ->check(CLI::Range(0, 1024));
   add(app, "--memory-mb", options.service.memory_mb,
-      "memory that the limits of running jobs may add up to; 0: what the machine has");
+      "memory that the limits of running jobs may add up to; 0: what the machine has, or its control group");
   add(app, "--share-s", options.service.sharing.least_s,
       "other workers may compute ranges of a bake that take at least so long; 0: none are given away")
       ->check(CLI::Range(0.0, 3600.0));

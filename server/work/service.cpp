@@ -1,7 +1,5 @@
 #include "server/work/service.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <thread>
@@ -12,6 +10,7 @@
 #include "server/work/data_folder.h"
 #include "server/work/event_stream.h"
 #include "server/work/housekeeping.h"
+#include "server/work/machine_memory.h"
 #include "server/work/neighbours.h"
 #include "server/work/sandbox.h"
 #include "server/work/supervisor.h"
@@ -54,13 +53,6 @@ std::vector<NamedBlob> all_files(const JobInputs& inputs) {
 
 std::string hash_of(const std::string& text) {
   return sha256_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-}
-
-std::uint64_t memory_mb(const ServiceOptions& options) {
-  if (options.memory_mb > 0) return options.memory_mb;
-  const auto bytes =
-      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  return bytes >> 20;
 }
 
 /// Everything a request says, so that an idempotency key means one request.
@@ -166,7 +158,9 @@ class LocalService final : public Service {
   const WorkOptions work_options_ = work_options();
   StopSignal plans_stop_;
   std::atomic<int> plans_{0};
-  Supervisor supervisor_{place(), {options_.workers, memory_mb(options_)}, [this] { return may_claim(); }};
+  Supervisor supervisor_{place(),
+                         {options_.workers, options_.memory_mb > 0 ? options_.memory_mb : machine_memory_mb()},
+                         [this] { return may_claim(); }};
   Housekeeping housekeeping_{place(), {options_.blob_grace, options_.retention}};
   Neighbours neighbours_{place(), supervisor_};
   UploadDesk desk_{*blobs_, [this](const auto& tenant, const auto& store) { return register_blob(tenant, store); }};

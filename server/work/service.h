@@ -34,7 +34,7 @@ struct ServiceOptions {
   StoreOptions stores;                      // where jobs and blobs live when not in `data`
   int workers = 1;                          // jobs at a time, each in a process of its own; 0: bake nothing
   int threads = 0;                          // of one worker when its recipe does not say; 0: hardware threads / workers
-  std::uint64_t memory_mb = 0;              // that running jobs may declare together; 0: what the machine has
+  std::uint64_t memory_mb = 0;              // that running jobs may declare together; 0: machine_memory.h
   Sharing sharing{.least_s = 10};           // of bakes, where there are other workers
   std::vector<std::string> worker_command;  // empty: this very program with "bake-worker"
   int max_queued = 1000;

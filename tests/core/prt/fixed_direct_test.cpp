@@ -58,6 +58,40 @@ TEST(FixedDirect, TheMeanOfManySmallRunsHasNoBias) {
   EXPECT_NEAR(sum / kRuns, expected, 0.02 * expected);  // standard error: about 0.15 / sqrt(400)
 }
 
+/// Where samples agree they are all that is taken, with the value of as many; near the lamp's edge more are, and the
+/// error falls.
+TEST(FixedDirect, OnlyPointsWithALargeErrorTakeMoreRays) {
+  const Scene scene = lamp_scene(0.01F, 1);
+  Threads threads(1);
+  const Tracer tracer(scene, threads);
+  const auto bake = [&](const std::vector<TransferPoint>& points, const FixedDirect& params, std::uint64_t* rays) {
+    TransferStats stats;
+    const std::vector<Vec3f> out = bake_fixed_direct(tracer, points, params, threads, &stats);
+    if (rays != nullptr) *rays = stats.rays;
+    return out;
+  };
+  constexpr std::uint64_t kOfOnePoint = 64 + 16;
+  std::uint64_t rays = 0;
+  const std::vector<TransferPoint> far{floor_point({0.45F, 0, 0.45F})};
+  const FixedDirect plain{.samples = 64, .seed = 3},
+      adaptive{.samples = 64, .seed = 3, .reach = 16, .tolerance = 0.01F};
+  const std::vector<Vec3f> once = bake(far, plain, nullptr), again = bake(far, adaptive, &rays);
+  EXPECT_EQ(rays, kOfOnePoint);
+  EXPECT_NEAR(again[0].x, once[0].x, 1e-6F);  // the same samples, summed in two parts
+
+  std::vector<TransferPoint> edge;
+  for (int i = 0; i < 64; ++i) edge.push_back(floor_point({0.25F, 0, -0.2F + 0.006F * static_cast<float>(i)}));
+  const std::vector<Vec3f> truth = bake(edge, {.samples = 16384, .seed = 9}, nullptr);
+  const auto squared_error = [&](const std::vector<Vec3f>& values) {
+    double sum = 0;
+    for (std::size_t i = 0; i < edge.size(); ++i) sum += std::pow(values[i].x - truth[i].x, 2);
+    return sum;
+  };
+  const double before = squared_error(bake(edge, plain, nullptr)), after = squared_error(bake(edge, adaptive, &rays));
+  EXPECT_GT(rays, 2 * kOfOnePoint * edge.size());
+  EXPECT_LT(after, before / 4);  // half the error: four times the samples, of independent ones
+}
+
 TEST(FixedDirect, BackOfASingleSidedLampIsDark) {
   Scene scene = lamp_scene(0.2F, 1);
   const TransferPoint above{{0, 0.4F, 0}, {0, -1, 0}, {0, 0.4F, 0}, {0, -1, 0}};
