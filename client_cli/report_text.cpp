@@ -106,6 +106,10 @@ std::string certificate_text(std::string_view report) {
     out += "\ntowards eyes, " + text_of(level, "file") + " (" + count(number_of(level, "triangles")) +
            " triangles): " + error_text(level["certificate"]);
   }
+  if (const json links = certificate_of(document, "links"); links.is_object() && links.contains("of_rms")) {
+    out += "\nof what lamps reflect, at " + count(number_of(links, "points")) +
+           " points: " + percent_text(number_of(links, "of_rms")) + " of its root mean square";
+  }
   if (const json grid = certificate_of(document, "grid"); grid.is_object())
     out += "\nof the grid, at " + count(number_of(grid, "points")) + " points of the surface: " + error_text(grid);
   return out;
@@ -120,8 +124,9 @@ std::string promise_text(std::string_view report) {
   if (!document.contains("error_sources")) return out;
   const json& sources = document["error_sources"];
   out += "\nof the error: noise " + percent_text(number_of(sources, "noise")) + " (of reflections " +
-         percent_text(number_of(sources, "noise_of_reflections")) + "), interpolation " +
-         percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
+         percent_text(number_of(sources, "noise_of_reflections")) + "), " +
+         (sources.contains("points") ? "points " + percent_text(number_of(sources, "points")) + ", " : "") +
+         "interpolation " + percent_text(number_of(sources, "interpolation")) + ", bounces left out " +
          percent_text(number_of(sources, "bounce_tail")) + ", quantisation " +
          percent_text(number_of(sources, "quantisation")) + ", compression " +
          percent_text(number_of(sources, "compression"));

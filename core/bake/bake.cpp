@@ -105,7 +105,10 @@ Plan plan_of(const CarriedScene& in, const Recipe& recipe, const std::optional<E
   if (recipe.grid) return make_grid_plan(scene, recipe, sky, threads);
   if (recipe.transport) return make_links_plan(scene, recipe, sky, threads);
   if (recipe.light_field) return make_light_field_plan(scene, recipe, sky, threads);
-  if (recipe.radiosity) return make_radiosity_plan(scene, *recipe.radiosity, recipe.quality, sky, threads);
+  if (recipe.radiosity) {
+    const RadiosityEffort effort = recipe.promise ? radiosity_effort(recipe.promise) : radiosity_effort(recipe.quality);
+    return make_radiosity_plan(scene, *recipe.radiosity, effort, sky, threads);
+  }
   return make_plan(scene, recipe.steps.front(), effort_of(recipe), threads);
 }
 
@@ -125,7 +128,7 @@ struct Pass {
   std::vector<StreamBytes> streams;
   std::size_t rank = 0;  // of the stored components; 0: raw
   BakedScene decoded;
-  std::uint64_t bounce_rays = 0;
+  std::uint64_t bounce_rays = 0, points = 0, gathered = 0;
   std::optional<MergeOutcome> merge;
   std::optional<Certificate> certificate;
   std::optional<ErrorSources> sources;
@@ -138,7 +141,7 @@ struct Pass {
 
 /// What the steps that light the scene as `radiosity` does make besides.
 struct LitResults {
-  Transfer transfer;
+  SolvedRadiosity solved;
   std::optional<GridOutcome> grid;
   std::optional<OutgoingLight> outgoing;
 };
@@ -150,6 +153,7 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   LitResults out;
   Result<GridOutcome> outcome;
   RadiosityHooks hooks;
+  hooks.sources = input.recipe.radiosity && input.recipe.certificate;
   hooks.lit = [&](const Tracer& tracer, const LitSurface* surface, std::span<const Vec3f> value) {
     const GatherFaces faces(tracer.scene());
     const IncidentLight::World world{tracer, faces, surface, sky};
@@ -168,7 +172,7 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
     hooks.more = {FinishSource::kWidth,
                   [&](std::span<const TransferPoint> points) { return finish->values(points, threads); }};
   }
-  out.transfer = solve_radiosity_step(scene, plan, sky, hooks, log, threads);
+  out.solved = solve_radiosity_step(scene, plan, sky, hooks, log, threads);
   if (!outcome) return tl::make_unexpected(outcome.error());
   if (plan.grid) out.grid = std::move(*outcome);
   return out;
@@ -180,12 +184,14 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
                        BakeLog& log, Threads& threads) {
   Scene& scene = in.scene;
   const bool carried = in.carries_light();
+  const std::uint64_t rays_before = log.rays();  // a certificate spends by its own pass: a resumed bake has no others
   Pass pass;
   BakedLight own;
   Transport transport;
   std::unique_ptr<LinksStep> links;
   std::optional<OutgoingLight> outgoing;
   std::optional<Mesh> unmerged;
+  double tail_left = plan.tail_left, points_squared = 0;
   if (plan.merge) unmerged = scene.mesh;
   if (carried) {
     own.name = "that of the file";
@@ -198,7 +204,11 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
       links = std::make_unique<LinksStep>(scene, plan, input.recipe.seed, log, threads);
     }
     KILN_TRY(lit, solve_light(input, scene, light ? &*light : nullptr, plan, links.get(), log, threads));
-    transport.transfer = std::move(lit.transfer);
+    transport.transfer = std::move(lit.solved.transfer);
+    transport.noise = std::move(lit.solved.noise);
+    transport.bounce_rays = lit.solved.gather_rays;
+    tail_left = lit.solved.tail, points_squared = lit.solved.points_squared;
+    pass.points = lit.solved.points, pass.gathered = lit.solved.gathered;
     pass.grid = std::move(lit.grid);
     outgoing = std::move(lit.outgoing);
   } else {
@@ -234,18 +244,20 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     log.begin("read links", 0.93);
     KILN_TRY(outcome, links->finish(glb, decoded, input.recipe, threads));
     pass.links = std::move(outcome);
+    pass.bounce_rays += pass.links->stats.rays;
     streams.push_back({"links", pass.links->bytes});
   }
   if (input.recipe.certificate) log.begin("certificate", 1.0);
   if (input.recipe.certificate && !carried) {
     const Tracer truth(scene, threads);
-    pass.certificate = certify(
-        decoded, truth, light,
-        {.bake_rays = log.rays(), .thorough = input.recipe.promise && !plan.radiosity, .seed = input.recipe.seed},
-        threads);
-    if (!plan.radiosity) {
+    pass.certificate = certify(decoded, truth, light,
+                               {.bake_rays = log.rays() - rays_before,
+                                .thorough = input.recipe.promise && (!plan.radiosity || input.recipe.radiosity),
+                                .seed = input.recipe.seed},
+                               threads);
+    if (!plan.radiosity || input.recipe.radiosity) {
       const double merging = pass.merge ? pass.merge->error : 0;
-      pass.sources = split_error(*pass.certificate, decoded, {noise, storage, plan.tail_left, merging});
+      pass.sources = split_error(*pass.certificate, decoded, {noise, storage, tail_left, merging, points_squared});
     }
   }
   if (stage) {
@@ -262,8 +274,8 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
                                .certificate = {}};
     if (input.recipe.certificate) {
       const Tracer truth(scene, threads);
-      pass.glossy->certificate =
-          certify_glossy(decoded, truth, light, {.bake_rays = log.rays(), .seed = input.recipe.seed}, threads);
+      pass.glossy->certificate = certify_glossy(
+          decoded, truth, light, {.bake_rays = log.rays() - rays_before, .seed = input.recipe.seed}, threads);
     }
   }
   pass.rank = encoding.transfer.components.rank();
@@ -278,6 +290,8 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
   PassRecord out;
   if (pass.field) {
     out = field_record(*pass.field);
+  } else if (pass.links) {
+    out = links_record(*pass.links, pass.plan, pass.decoded.scene.mesh);
   } else {
     const ErrorStats& error = pass.certificate->transport;
     out = {.order = pass.plan.order,
@@ -297,19 +311,16 @@ PassRecord record_of(const Pass& pass, double seconds, std::uint64_t rays, doubl
       out.own_high = pass.certificate->job_light->interval_high;
     }
   }
+  if (pass.plan.radiosity && !pass.field && !pass.links) {
+    out.samples = pass.plan.radiosity->direct.sky, out.bounce_samples = pass.plan.radiosity->rays;
+    out.points = pass.points, out.gathered = pass.gathered;
+  }
   out.rays = rays;
   out.bounce_rays = pass.bounce_rays;
   out.seconds = seconds;
   if (pass.certificate) out.certificate_seconds += pass.certificate->seconds;
   out.elapsed_s = elapsed_s;
   return out;
-}
-
-/// What the recipe fixes of the step that is baked in passes.
-PrtStep fixed_knobs(const Recipe& recipe) {
-  if (!recipe.light_field) return recipe.steps.empty() ? PrtStep{} : recipe.steps.front();
-  const LightFieldStep& step = *recipe.light_field;
-  return {.order = step.degree, .samples = step.rays, .subdivide = step.surface.subdivide};
 }
 
 /// A single pass where a quality was asked for; where a promise was made, passes until it is kept or cannot be.
@@ -364,8 +375,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
         {"no_light", "No environment was asked for and the scene has no lights: it looks black.", ""});
   }
 
-  Passes passes(input.recipe.promise, fixed_knobs(input.recipe), input.recipe.limits,
-                input.recipe.light_field ? light_field_passes() : PassKind{});
+  Passes passes(input.recipe.promise, fixed_knobs(input.recipe), input.recipe.limits, passes_of(input.recipe));
   KILN_TRY(pass, bake_passes(input, std::move(in), light, plan, passes, checkpoints, log, threads));
 
   log.share(0.97, 1);

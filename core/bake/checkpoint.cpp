@@ -25,6 +25,8 @@ json record_json(const PassRecord& p) {
           {"vertices", p.vertices},
           {"rays", p.rays},
           {"bounce_rays", p.bounce_rays},
+          {"points", p.points},
+          {"gathered", p.gathered},
           {"seconds", p.seconds},
           {"certificate_seconds", p.certificate_seconds},
           {"elapsed_s", p.elapsed_s},
@@ -33,7 +35,8 @@ json record_json(const PassRecord& p) {
           {"own_relrmse", optional_json(p.own_relrmse)},
           {"own_high", optional_json(p.own_high)},
           {"sources",
-           {s.noise, s.noise_of_reflections, s.bounce_tail, s.quantisation, s.compression, s.interpolation, s.merging}},
+           {s.noise, s.noise_of_reflections, s.bounce_tail, s.quantisation, s.compression, s.interpolation, s.merging,
+            s.points}},
           {"truncation", optional_json(s.truncation)}};
 }
 
@@ -50,6 +53,8 @@ PassRecord read_record(const json& value) {
           .seconds = value.at("seconds").get<double>(),
           .certificate_seconds = value.at("certificate_seconds").get<double>(),
           .elapsed_s = value.at("elapsed_s").get<double>(),
+          .points = value.at("points").get<std::uint64_t>(),
+          .gathered = value.at("gathered").get<std::uint64_t>(),
           .relrmse = value.at("relrmse").get<double>(),
           .low = value.at("interval").at(0).get<double>(),
           .high = value.at("interval").at(1).get<double>(),
@@ -62,6 +67,7 @@ PassRecord read_record(const json& value) {
                       .compression = s.at(4).get<double>(),
                       .interpolation = s.at(5).get<double>(),
                       .merging = s.at(6).get<double>(),
+                      .points = s.at(7).get<double>(),
                       .truncation = optional_number(value.at("truncation"))}};
 }
 

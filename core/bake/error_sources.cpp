@@ -19,7 +19,7 @@ class Judged {
  public:
   Judged(const Certificate& certificate, const BakedScene& decoded)
       : transfer_(decoded.transfer),
-        all_(test_lightings(decoded.transfer.order, decoded.light)),
+        all_(decoded.transfer.order > 0 ? test_lightings(decoded.transfer.order, decoded.light) : Lightings{}),
         certificate_(certificate) {}
 
   /// Mean over the judged lightings of squared(light) / mean_light^2; light[i] of a channel, the lamps' slot last.
@@ -42,7 +42,7 @@ class Judged {
     std::vector<double> out(static_cast<std::size_t>(transfer_.slots()), 0.0);
     const auto found = std::ranges::find(all_.names, name);
     if (found == all_.names.end()) {
-      out.back() = 1;  // the lamps
+      out.back() = 1;  // the lamps, or of order 0 all of the job's light
       return out;
     }
     const auto& sh = all_.sh[static_cast<std::size_t>(found - all_.names.begin())];
@@ -88,7 +88,9 @@ ErrorSources split_error(const Certificate& certificate, const BakedScene& decod
   const double left =
       std::max(0.0, square(certificate.transport.relrmse) - rays - steps - rest - square(known.tail_left));
   out.merging = std::min(known.merging, root(left));  // an estimate, and half of it is seen again by the next vertices
-  out.interpolation = root(left - square(out.merging));
+  const double read = judged.mean([&](const std::vector<double>&, std::size_t) { return known.points_squared; });
+  out.points = std::min(root(read), root(left - square(out.merging)));
+  out.interpolation = root(left - square(out.merging) - square(out.points));
   if (certificate.job_light && !certificate.transport.by_lighting.empty()) {
     const auto own = std::ranges::find(certificate.lightings, decoded.light.name);
     const bool known = own != certificate.lightings.end() && !decoded.light.coefficients.empty();

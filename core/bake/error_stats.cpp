@@ -18,7 +18,7 @@ double mean_channel(const Vec3d& a) { return (a.x + a.y + a.z) / 3; }
 /// What a point contributes to one lighting: means over RGB times its weight, not yet divided by the lighting's scale.
 struct Cell {
   double squared = 0;  // (x - ref)^2 - noise
-  double size = 0;     // |ref|, or |x| where the lighting is dark
+  double size = 0;     // |ref|, or |x| where the lighting is dark; of_rms: ref^2 - noise, or x^2
 };
 
 struct Table {
@@ -26,6 +26,7 @@ struct Table {
   std::vector<Cell> cells;     // lighting * points + point
   std::vector<bool> dark;      // lightings without any light in reference and values
   std::vector<double> weight;  // of the points
+  bool of_rms = false;
 };
 
 double sum_of_sizes(std::span<const Vec3d> values) {
@@ -34,7 +35,7 @@ double sum_of_sizes(std::span<const Vec3d> values) {
 }
 
 Table make_table(const ErrorInput& in) {
-  Table table{in.points, in.values.size() / in.points, std::vector<Cell>(in.values.size()), {}, {}};
+  Table table{in.points, in.values.size() / in.points, std::vector<Cell>(in.values.size()), {}, {}, in.of_rms};
   table.weight.assign(in.points, 1.0);
   if (!in.weights.empty()) table.weight.assign(in.weights.begin(), in.weights.end());
   for (std::size_t lighting = 0; lighting < table.lightings; ++lighting) {
@@ -46,15 +47,25 @@ Table make_table(const ErrorInput& in) {
       const Vec3d difference = in.values[i] - in.reference[i];
       const double noise = in.noise.empty() ? 0.0 : mean_channel(in.noise[i]);
       const double weight = table.weight[i - first];
-      table.cells[i] = {weight * (mean_channel(difference * difference) - noise),
-                        weight * mean_channel(absolute(sizes[i]))};
+      const double size =
+          in.of_rms ? mean_channel(sizes[i] * sizes[i]) - (lit ? noise : 0) : mean_channel(absolute(sizes[i]));
+      table.cells[i] = {weight * (mean_channel(difference * difference) - noise), weight * size};
     }
   }
   return table;
 }
 
-/// Sums over points of one lighting, n their weight; relRMSE^2 = (squared / n) / (size / n)^2.
-double squared_error(const Cell& sum, double n) { return sum.size > 0 ? sum.squared * n / (sum.size * sum.size) : 0.0; }
+/// Sums over points of one lighting, n their weight: the square of what its error is relative to.
+double squared_scale(const Table& table, const Cell& sum, double n) {
+  const double mean = sum.size / n;
+  return table.of_rms ? mean : mean * mean;
+}
+
+/// relRMSE^2 of one lighting.
+double squared_error(const Table& table, const Cell& sum, double n) {
+  if (table.of_rms) return sum.size > 0 ? sum.squared / sum.size : 0.0;
+  return sum.size > 0 ? sum.squared * n / (sum.size * sum.size) : 0.0;
+}
 
 double to_error(double mean_squared) { return std::sqrt(std::max(mean_squared, 0.0)); }
 
@@ -81,9 +92,9 @@ std::vector<Cell> sums_over(const Table& table, std::span<const std::uint32_t> p
 }
 
 /// Mean of relRMSE^2 over lightings. Signed: near zero the noise may have taken more than there was.
-double mean_squared_error(const std::vector<Cell>& sums, double n) {
+double mean_squared_error(const Table& table, const std::vector<Cell>& sums, double n) {
   double mean = 0;
-  for (const Cell& sum : sums) mean += squared_error(sum, n);
+  for (const Cell& sum : sums) mean += squared_error(table, sum, n);
   return mean / static_cast<double>(sums.size());
 }
 
@@ -115,7 +126,7 @@ double acceleration(const Table& table, const std::vector<Cell>& sums) {
       const Cell& cell = table.cells[lighting * table.points + point];
       rest[lighting] = {sums[lighting].squared - cell.squared, sums[lighting].size - cell.size};
     }
-    without[point] = mean_squared_error(rest, n - table.weight[point]);
+    without[point] = mean_squared_error(table, rest, n - table.weight[point]);
   }
   const double mean = std::accumulate(without.begin(), without.end(), 0.0) / static_cast<double>(without.size());
   double second = 0, third = 0;
@@ -136,7 +147,7 @@ std::vector<double> resampled_errors(const Table& table, const Bootstrap& bootst
     for (std::uint32_t& point : drawn) {
       point = static_cast<std::uint32_t>(random.uniform_double() * static_cast<double>(table.points));
     }
-    errors[sample] = mean_squared_error(sums_over(table, drawn), weight_of(table, drawn));
+    errors[sample] = mean_squared_error(table, sums_over(table, drawn), weight_of(table, drawn));
   }
   std::sort(errors.begin(), errors.end());
   return errors;
@@ -167,7 +178,7 @@ double quantile(const std::vector<Deviation>& sorted, double p) {
 
 /// [Efron87]: percentiles of the resampled figure, moved for its bias (z0) and its changing spread (a).
 void add_interval(const Table& table, const std::vector<Cell>& sums, const Bootstrap& bootstrap, ErrorStats& stats) {
-  const double squared = mean_squared_error(sums, weight_of(table));
+  const double squared = mean_squared_error(table, sums, weight_of(table));
   stats.interval_low = stats.interval_high = to_error(squared);
   if (table.points < 2) return;
   const std::vector<double> errors = resampled_errors(table, bootstrap);
@@ -191,16 +202,16 @@ double without_worst(const Table& table, const std::vector<Cell>& sums) {
   const double n = weight_of(table);
   std::vector<double> share(table.points);
   for (std::size_t i = 0; i < table.cells.size(); ++i) {
-    const double size = sums[i / table.points].size;
+    const double scale = squared_scale(table, sums[i / table.points], n);
     const std::size_t point = i % table.points;
-    if (size > 0) share[point] += table.cells[i].squared / table.weight[point] * n / (size * size);
+    if (scale > 0) share[point] += table.cells[i].squared / table.weight[point] / (n * scale);
   }
   std::vector<std::uint32_t> points = all_points(table);
   std::stable_sort(points.begin(), points.end(), [&](auto a, auto b) { return share[a] < share[b]; });
   for (double left_out = 0; points.size() > 1 && left_out < 0.01 * n; points.pop_back())
     left_out += table.weight[points.back()];
   std::sort(points.begin(), points.end());
-  return to_error(mean_squared_error(sums_over(table, points), weight_of(table, points)));
+  return to_error(mean_squared_error(table, sums_over(table, points), weight_of(table, points)));
 }
 
 /// Figures over single channels: p99, max, bias, and the noise that was subtracted.
@@ -210,8 +221,8 @@ void add_channel_figures(const ErrorInput& in, const Table& table, const std::ve
   double signed_sum = 0, noise_sum = 0;
   const double n = weight_of(table);
   for (std::size_t i = 0; i < in.values.size(); ++i) {
-    const double mean = sums[i / in.points].size / n, weight = table.weight[i % in.points];
-    const double scale = mean > 0 ? 1 / mean : 0;
+    const double size = squared_scale(table, sums[i / in.points], n), weight = table.weight[i % in.points];
+    const double scale = size > 0 ? 1 / std::sqrt(size) : 0;
     const Vec3d difference = (in.values[i] - in.reference[i]) * scale;
     signed_sum += weight * mean_channel(difference);
     if (!in.noise.empty()) noise_sum += weight * mean_channel(in.noise[i]) * scale * scale;
@@ -239,9 +250,9 @@ ErrorStats compute_error(const ErrorInput& in, const Bootstrap& bootstrap) {
   stats.points = table.points;
   stats.lightings = static_cast<int>(table.lightings);
   stats.dark_lightings = static_cast<int>(std::count(table.dark.begin(), table.dark.end(), true));
-  stats.relrmse = to_error(mean_squared_error(sums, weight_of(table)));
+  stats.relrmse = to_error(mean_squared_error(table, sums, weight_of(table)));
   for (const Cell& sum : sums) {
-    stats.by_lighting.push_back(to_error(squared_error(sum, weight_of(table))));
+    stats.by_lighting.push_back(to_error(squared_error(table, sum, weight_of(table))));
   }
   stats.relrmse_without_worst_1pct = without_worst(table, sums);
   add_channel_figures(in, table, sums, stats);

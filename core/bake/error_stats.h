@@ -6,6 +6,8 @@
 // Efron's bias-corrected and accelerated bootstrap (1987) over points Shape   lighting * points + point, in all arrays
 // Cost    points x lightings x resamples additions; at most about a second
 // Repeat  same bits for the same seed
+// Of rms  the same relative to the root of mean ref^2 - noise: a lamp that lights one room of many has a small mean and
+// large values.
 // Dark    A lighting whose reference is zero everywhere is scaled by the mean |x| instead (every light in it is wrong,
 // so
 //         its error is at least 1); where x is zero too it has error 0 by definition and counts in `dark_lightings`.
@@ -24,6 +26,7 @@ struct ErrorInput {
   std::span<const Vec3d> noise;          // variance of each reference value, per channel; empty: the reference is exact
   std::size_t points = 0;                // values.size() = lightings * points
   std::span<const double> weights = {};  // of the points, where they are not drawn evenly; empty: all alike
+  bool of_rms = false;                   // relative to the reference's root mean square instead of its mean
 };
 
 struct Bootstrap {

@@ -188,7 +188,7 @@ std::optional<Ending> ending_of(const Recipe& recipe, const GridPass& last, cons
 Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const GridStep& step = *recipe.grid;
   const Quality surface = recipe.promise ? Quality::standard : recipe.quality;
-  Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, surface, sky, threads);
+  Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, radiosity_effort(surface), sky, threads);
   const GridEffort effort = grid_effort(recipe);
   const Box box = box_of(scene.mesh);
   const Tracer tracer(scene, threads);

@@ -108,7 +108,7 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   RadiosityStep surface = step.surface;
   if (!surface.subdivide.triangles) surface.subdivide.triangles = scene.mesh.triangles.size() + effort.triangles;
   if (recipe.promise && !surface.subdivide.threshold) surface.subdivide.threshold = 0;
-  Plan plan = make_radiosity_plan(scene, surface, surface_quality(recipe), sky, threads);
+  Plan plan = make_radiosity_plan(scene, surface, radiosity_effort(surface_quality(recipe)), sky, threads);
   FieldPlan& f = plan.field.emplace();
   f.outgoing.degree = step.degree.value_or(effort.degree);
   f.outgoing.rays = step.rays.value_or(effort.rays);

@@ -20,8 +20,10 @@ struct LinksEffort {
   std::uint32_t most_senders;  // where the recipe gives no level
 };
 
-LinksEffort links_effort(Quality quality) {
-  switch (quality) {
+/// Of the first pass towards a promise: a quarter of the points of `draft`, whose error is about .15.
+LinksEffort links_effort(const Recipe& recipe) {
+  if (recipe.promise) return {"the first pass", 256, 0.05F, {.split = 0.01F, .largest = 0.08F}, 0.25, 3000};
+  switch (recipe.quality) {
     case Quality::draft:
       return {"the draft quality", 256, 0.05F, {.split = 0.01F, .largest = 0.08F}, 0.5, 6000};
     case Quality::standard:
@@ -42,12 +44,23 @@ double sending_area(const Scene& scene) {
   return sum;
 }
 
+double points_of(const LinkParams& l, const Scene& scene) {
+  return expected_points(sending_area(scene), std::ldexp(double{l.points.radius}, 1 - l.points.levels));
+}
+
+std::string links_text(const Plan& plan, const Scene& scene) {
+  return "about " + short_text(points_of(*plan.links, scene)) + " points";
+}
+
+std::string oracle_text(const LinkOracle& oracle) {
+  return short_text(double{oracle.split}) + ", " + short_text(double{oracle.largest});
+}
+
 /// Adds the links to a prediction, by points. Seconds a ray, links a row and bytes as measured by kiln_transport.
 void add_prediction(Plan& plan, const Scene& scene) {
   constexpr double kSecondsARay = 0.25e-6, kLinksARow = 70, kBytesATerm = 5, kTerms = 10;
   const LinkParams& l = *plan.links;
-  const double finest = std::ldexp(double{l.points.radius}, 1 - l.points.levels);
-  const double points = expected_points(sending_area(scene), finest), rays = points * l.rays;
+  const double points = points_of(l, scene), rays = points * l.rays;
   const double senders = std::min(points, double(l.most_senders));
   Prediction& out = plan.prediction;
   const auto whole = [](double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); };
@@ -63,8 +76,10 @@ void add_prediction(Plan& plan, const Scene& scene) {
 
 Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const TransportStep& step = *recipe.transport;
-  Plan plan = make_radiosity_plan(scene, step.surface, recipe.quality, sky, threads);
-  const LinksEffort effort = links_effort(recipe.quality);
+  Plan plan = make_radiosity_plan(scene, step.surface,
+                                  recipe.promise ? radiosity_effort(recipe.promise) : radiosity_effort(recipe.quality),
+                                  sky, threads);
+  const LinksEffort effort = links_effort(recipe);
   LinkParams& l = plan.links.emplace();
   l.rays = step.surface.rays.value_or(effort.rays);
   l.eps = static_cast<float>(step.surface.eps_irradiance.value_or(effort.eps));
@@ -79,21 +94,62 @@ Plan make_links_plan(const Scene& scene, const Recipe& recipe, const Environment
     l.points = resolve(l.points, scene);
   }
   const std::string asked = "asked for by the recipe";
-  const double finest = std::ldexp(double{l.points.radius}, 1 - l.points.levels);
-  decide(plan, "links", "about " + short_text(expected_points(sending_area(scene), finest)) + " points",
+  decide(plan, "links", links_text(plan, scene),
          "reflected light of lights that move, from senders to receivers; backs of double-sided faces send too");
   decide(plan, "sender_level", l.sender_level < 0 ? "auto" : std::to_string(l.sender_level),
          l.sender_level < 0 ? "the finest with at most " + std::to_string(l.most_senders) + " points" : asked);
   decide(plan, "link rays", std::to_string(l.rays), step.surface.rays ? asked : effort.reason);
-  decide(plan, "link oracle", short_text(double{l.oracle.split}) + ", " + short_text(double{l.oracle.largest}),
+  decide(plan, "link oracle", oracle_text(l.oracle),
          effort.reason + std::string(": variation and size, of a receiver's light, above which a link is split"));
   add_prediction(plan, scene);
   return plan;
 }
 
+/// Errors of groups fall with the size of what is linked at once, which is as the cells of senders.
+void grow_links(Plan& plan, const RadiosityGrowth& growth, const Scene& scene) {
+  constexpr double kMostRays = 65536;
+  grow_radiosity(plan, growth, scene);
+  LinkParams& l = *plan.links;
+  l.rays = static_cast<int>(std::min(kMostRays, std::ceil(l.rays * growth.reflected / 16) * 16));
+  const auto nearer = static_cast<float>(1 / std::sqrt(growth.points));
+  l.points.radius *= nearer;
+  l.most_senders = static_cast<std::uint32_t>(std::min(double{kMostSenders}, l.most_senders * growth.points));
+  for (LinkOracle* oracle : {&l.oracle, &l.sender_oracle}) oracle->split *= nearer, oracle->largest *= nearer;
+  if (!growth.eps_fixed) l.eps *= nearer;
+  add_prediction(plan, scene);
+  for (Decision& d : plan.decisions) {
+    if (d.decision == "link rays") d = {d.decision, std::to_string(l.rays), growth.reason};
+    if (d.decision == "links") d = {d.decision, links_text(plan, scene), growth.reason};
+    if (d.decision == "sender_level" && l.sender_level < 0)
+      d.reason = "the finest with at most " + std::to_string(l.most_senders) + " points";
+    if (d.decision == "link oracle") d = {d.decision, oracle_text(l.oracle), growth.reason};
+  }
+}
+
+PassRecord links_record(const LinksOutcome& links, const Plan& plan, const Mesh& delivered) {
+  const LinksCertificate& c = *links.certificate;
+  return {.samples = plan.radiosity->direct.sky,
+          .bounce_samples = plan.links->rays,
+          .triangles = delivered.triangles.size(),
+          .vertices = delivered.position.size(),
+          .certificate_seconds = c.seconds,
+          .points = links.links.senders,
+          .gathered = links.links.rows() - links.links.senders,
+          .relrmse = c.of_rms.relrmse,
+          .low = c.of_rms.interval_low,
+          .high = c.of_rms.interval_high,
+          .own_relrmse = {},
+          .own_high = {},
+          .sources = {.noise = c.sources.noise,
+                      .noise_of_reflections = c.sources.noise,
+                      .interpolation = c.sources.interpolation,
+                      .points = std::hypot(c.sources.senders, c.sources.links)}};
+}
+
 LinksStep::LinksStep(const Scene& scene, Plan& plan, std::uint64_t seed, BakeLog& log, Threads& threads)
     : plan_(plan),
       log_(log),
+      rays_before_(log.rays()),
       scene_(scene),
       tracer_(scene_, threads),
       builder_(
@@ -114,7 +170,9 @@ std::vector<float> LinksStep::values(std::span<const TransferPoint> points, Thre
 }
 
 Result<LinksOutcome> LinksStep::finish(Bytes& glb, const BakedScene& decoded, const Recipe& recipe, Threads& threads) {
+  const std::uint64_t rays = builder_.stats().rays;
   const LightLinks made = builder_.finish(decoded.scene.mesh, threads);
+  log_.count_rays(builder_.stats().rays - rays);
   const std::size_t before = glb.size();
   KILN_TRY(with, add_links(glb, made));
   glb = std::move(with);
@@ -131,9 +189,10 @@ Result<LinksOutcome> LinksStep::finish(Bytes& glb, const BakedScene& decoded, co
          std::to_string(out.links.links.size()) + ", " + short_text(100 * out.links.share_of_possible()) + " %",
          "of a link from each sender to each receiver");
   if (recipe.certificate) {
-    out.certificate =
-        certify_links({decoded, out.links, tracer_, plan_.links->bounces, log_.rays(), false, recipe.seed}, threads);
-    log_.know_error(out.certificate->error.relrmse);
+    out.certificate = certify_links({decoded, out.links, &builder_, tracer_, plan_.links->bounces,
+                                     log_.rays() - rays_before_, static_cast<bool>(recipe.promise), recipe.seed},
+                                    threads);
+    log_.know_error(out.certificate->of_rms.relrmse);
   }
   return out;
 }

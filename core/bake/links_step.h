@@ -10,6 +10,8 @@
 #include "core/bake/bake_log.h"
 #include "core/bake/links_certificate.h"
 #include "core/bake/plan.h"
+#include "core/bake/progressive.h"
+#include "core/bake/radiosity_step.h"
 #include "core/bake/recipe.h"
 #include "core/meshless/link_builder.h"
 
@@ -18,12 +20,19 @@ namespace kiln {
 /// The plan of `radiosity` with the links added: decisions, seconds, memory, bytes.
 Plan make_links_plan(const Scene&, const Recipe&, const Environment* sky, Threads&);
 
+/// Of a later pass: links of so many times the rays and points, and the light of the job with them.
+void grow_links(Plan&, const RadiosityGrowth&, const Scene&);
+
 struct LinksOutcome {
   LightLinks links;  // as delivered
   LinkStats stats;
   std::uint64_t bytes = 0;  // of the extension in the file
   std::optional<LinksCertificate> certificate;
 };
+
+/// Of a pass, for progressive.h: what the promise bounds is links.certificate.of_rms. `points` senders, `gathered`
+/// receivers.
+PassRecord links_record(const LinksOutcome&, const Plan&, const Mesh& delivered);
 
 /// Builds before the mesh is refined, and finishes when it has been written.
 class LinksStep {
@@ -41,6 +50,7 @@ class LinksStep {
  private:
   Plan& plan_;
   BakeLog& log_;
+  std::uint64_t rays_before_;  // this pass
   Scene scene_;
   Tracer tracer_;
   LinkBuilder builder_;

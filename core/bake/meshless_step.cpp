@@ -29,15 +29,14 @@ SweptTransfer sweep_on_points(const MeshlessWork& work, const std::vector<float>
                               const std::vector<StandIn>& stand_ins, const std::vector<std::uint32_t>& probes) {
   constexpr std::uint64_t kStages = 5;
   const Plan& plan = work.plan;
-  DirectTransfer rays = sky_rays(work.tracer, plan, work.band_power, work.seed, work.threads);
-  rays.samples = std::max(16, rays.samples / kRoughRays);
-  rays.band_power.assign(work.band_power.begin(), work.band_power.end());
+  TransferRays rays = rough(transfer_rays(work.tracer, plan, work.band_power, work.seed, work.threads));
+  rays.sky.band_power.assign(work.band_power.begin(), work.band_power.end());
   const auto vertices = static_cast<double>(work.tracer.scene().mesh.position.size());
   StageClock& clock = work.outcome.sweep_clock;
   TransferSweeps params{.bounces = plan.bounces,
                         .points = sweep_points(*plan.meshless, work.tracer.scene(), vertices),
-                        .sky = rays,
-                        .lamp_samples = std::max(16, plan.lamp_samples / kRoughRays),
+                        .sky = rays.sky,
+                        .lamps = rays.lamps,
                         .rays = plan.bounce_samples,
                         .eps = plan.meshless->eps,
                         .seed = work.seed,

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "core/bake/light_field_step.h"
+#include "core/bake/links_step.h"
+#include "core/bake/radiosity_step.h"
 
 namespace kiln {
 namespace {
@@ -25,13 +27,14 @@ double square(double x) { return x * x; }
 
 /// What a pass costs, in shadow rays: it must not depend on a clock.
 struct Parts {
-  double direct, reflected, triangles;
+  double direct, reflected, points, triangles;
 
   Parts(const PassRecord& pass, const PassKind& kind)
       : direct(static_cast<double>(pass.rays - pass.bounce_rays)),
         reflected(kind.gather_ray * static_cast<double>(pass.bounce_rays)),
+        points(kind.point * static_cast<double>(pass.points)),
         triangles(kind.triangle * static_cast<double>(pass.triangles)) {}
-  double all() const { return direct + reflected + triangles; }
+  double all() const { return direct + reflected + points + triangles; }
 };
 
 /// Seconds that grow with rays and triangles.
@@ -39,6 +42,9 @@ double work(const PassRecord& pass) { return std::max(1e-3, pass.seconds - pass.
 
 bool is_of(const PassRecord& record, const Plan& plan) {
   if (plan.field) return record.order == plan.field->outgoing.degree && record.samples == plan.field->outgoing.rays;
+  if (plan.links) return record.samples == plan.radiosity->direct.sky && record.bounce_samples == plan.links->rays;
+  if (plan.radiosity)
+    return record.samples == plan.radiosity->direct.sky && record.bounce_samples == plan.radiosity->rays;
   return record.order == plan.order && record.samples == plan.samples && record.bounce_samples == plan.bounce_samples;
 }
 
@@ -56,18 +62,8 @@ std::string percent(double x) {
 
 }  // namespace
 
-/// Measured on the helmet at standard: .31 us a shadow ray, .47 us one of the field, 65 us of splits and simplification
-/// a triangle. Half of the error is in places between vertices, the rest in bands: it falls slower.
-PassKind light_field_passes() {
-  return {.gather_ray = 1.5,
-          .triangle = 200,
-          .power = 0.5,
-          .rays = "/steps/0/rays",
-          .last_knob = "what smooth surfaces mirror of edges is soft whatever the knobs"};
-}
-
-Passes::Passes(const Promise& promise, const PrtStep& step, const Limits& limits, const PassKind& kind)
-    : promise_(promise), step_(step), limits_(limits), kind_(kind) {}
+Passes::Passes(const Promise& promise, const FixedKnobs& fixed, const Limits& limits, const PassKind& kind)
+    : promise_(promise), fixed_(fixed), limits_(limits), kind_(kind) {}
 
 void Passes::add(const PassRecord& pass) { all_.push_back(pass); }
 
@@ -79,7 +75,7 @@ std::optional<Plan> Passes::end(Ending ending, std::string reason) {
 bool Passes::transport_met() const { return promise_.target_error && all_.back().high <= *promise_.target_error; }
 
 bool Passes::own_light_bound() const {
-  return promise_.target_error && !step_.order && all_.back().own_high.has_value();
+  return promise_.target_error && !fixed_.order && all_.back().own_high.has_value();
 }
 
 /// The last pass cost at least twice the one before it and hardly helped.
@@ -99,9 +95,14 @@ double Passes::time_growth() const {
   return left / work(now);
 }
 
+/// Without points of their own the vertices, which are as the triangles, have the reflected rays.
 double Passes::cost(Growth g) const {
   const Parts parts(all_.back(), kind_);
-  return g.triangles * (parts.direct * g.direct + parts.reflected * g.reflected + parts.triangles) / parts.all();
+  if (parts.points == 0)
+    return g.triangles * (parts.direct * g.direct + parts.reflected * g.reflected + parts.triangles) / parts.all();
+  return (g.triangles * (parts.direct * g.direct + parts.triangles) +
+          g.points * (parts.reflected * g.reflected + parts.points)) /
+         parts.all();
 }
 
 /// From two passes of one order that differ in triangles; that of its kind until there are such.
@@ -115,49 +116,55 @@ double Passes::interpolation_power() const {
   return std::clamp(std::log(a.sources.interpolation / b.sources.interpolation) / growth, 0.25, 1.0);
 }
 
-bool Passes::free_triangles() const {
-  return step_.subdivide.mode != PrtStep::Subdivision::Mode::off && !step_.subdivide.triangles;
-}
-
 /// The squared error of a pass that has grown.
 double Passes::predicted(Growth g) const {
   const ErrorSources& s = all_.back().sources;
   const double reflected = square(s.noise_of_reflections), direct = square(s.noise) - reflected;
   return direct / g.direct + reflected / g.reflected +
          square(s.interpolation) * std::pow(g.triangles, -2 * interpolation_power()) + square(s.bounce_tail) +
-         square(s.quantisation) + square(s.compression) + square(s.merging);
+         square(s.quantisation) + square(s.compression) + square(s.merging) +
+         square(s.points) * std::pow(g.points, -2 * kind_.points_power);
 }
 
 /// The fewest rays that leave so much noise, by Lagrange: rays of each kind as the root of noise over cost.
-Passes::Growth Passes::rays_for(double noise) const {
-  if (step_.samples) return {};
+Passes::Growth Passes::rays_for(double noise, const Growth& places) const {
+  Growth out = places;
   const ErrorSources& s = all_.back().sources;
   const Parts cost(all_.back(), kind_);
+  const double dear = kind_.point > 0 ? places.points / places.triangles : 1;  // a reflected ray, beside a direct one
   const double reflected = square(s.noise_of_reflections), direct = std::max(0.0, square(s.noise) - reflected);
   const auto limited = [](double growth) { return std::clamp(growth, 1.0, kMostSamples); };
-  if (noise <= 0) return {kMostSamples, kMostSamples, 1};
-  const double both = std::sqrt(direct * cost.direct) + std::sqrt(reflected * cost.reflected);
-  const auto growth = [&](double own, double price) { return own > 0 ? std::sqrt(own / price) * both / noise : 0; };
-  Growth out{limited(growth(direct, cost.direct)), limited(growth(reflected, cost.reflected)), 1};
-  if (out.direct == 1) out.reflected = limited(noise > direct ? reflected / (noise - direct) : kMostSamples);
-  if (out.reflected == 1) out.direct = limited(noise > reflected ? direct / (noise - reflected) : kMostSamples);
+  out.direct = fixed_.direct ? 1 : kMostSamples, out.reflected = fixed_.reflected ? 1 : kMostSamples;
+  if (noise <= 0 || (fixed_.direct && fixed_.reflected)) return out;
+  const double reflected_cost = cost.reflected * dear;
+  if (!fixed_.direct && !fixed_.reflected) {
+    const double both = std::sqrt(direct * cost.direct) + std::sqrt(reflected * reflected_cost);
+    const auto growth = [&](double own, double price) { return own > 0 ? std::sqrt(own / price) * both / noise : 0; };
+    out.direct = limited(growth(direct, cost.direct)), out.reflected = limited(growth(reflected, reflected_cost));
+  }
+  if (!fixed_.reflected && (fixed_.direct || out.direct == 1))
+    out.reflected = limited(noise > direct ? reflected / (noise - direct) : kMostSamples);
+  if (!fixed_.direct && (fixed_.reflected || out.reflected == 1))
+    out.direct = limited(noise > reflected ? direct / (noise - reflected) : kMostSamples);
   return out;
 }
 
 /// The cheapest growth that brings the error to `wanted`, or nearly as near to it as any.
 Passes::Growth Passes::towards(double wanted) const {
-  constexpr int kSteps = 48;
+  constexpr int kSteps = 48, kPointSteps = 24;
   constexpr double kNearly = 1.25;  // of the squared error
   std::vector<Growth> all;
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= (free_triangles() ? kSteps : 0); ++i) {
-    Growth noiseless;
-    noiseless.direct = noiseless.reflected = std::numeric_limits<double>::infinity();
-    noiseless.triangles = std::pow(kMostTriangles, i / double{kSteps});
-    Growth growth = rays_for(square(wanted) - predicted(noiseless));
-    growth.triangles = noiseless.triangles;
-    least = std::min(least, predicted(growth));
-    all.push_back(growth);
+    for (int k = 0; k <= (free_points() ? kPointSteps : 0); ++k) {
+      Growth noiseless;
+      noiseless.direct = noiseless.reflected = std::numeric_limits<double>::infinity();
+      noiseless.triangles = std::pow(kMostTriangles, i / double{kSteps});
+      noiseless.points = std::pow(kMostTriangles, k / double{kPointSteps});
+      const Growth growth = rays_for(square(wanted) - predicted(noiseless), noiseless);
+      least = std::min(least, predicted(growth));
+      all.push_back(growth);
+    }
   }
   const double near = std::max(square(wanted) * (1 + 1e-9), kNearly * least);
   std::erase_if(all, [&](const Growth& g) { return predicted(g) > near; });
@@ -178,7 +185,7 @@ Passes::Growth Passes::within(double most) const {
 bool Passes::bands_missing(const Plan& last) const {
   constexpr double kPart = 0.4;
   const ErrorSources& s = all_.back().sources;
-  return last.field && !step_.order && last.field->outgoing.degree < kMaxLightFieldDegree &&
+  return last.field && !fixed_.order && last.field->outgoing.degree < kMaxLightFieldDegree &&
          s.truncation.value_or(0) > kPart * s.interpolation;
 }
 
@@ -191,6 +198,10 @@ bool Passes::simplified_too_far(const Plan& last) const {
   return std::hypot(s.noise, s.interpolation) < kLessTarget * *promise_.target_error;
 }
 
+std::string Passes::pass_reason() const {
+  return "pass " + std::to_string(all_.size() + 1) + ", from the error of the last one";
+}
+
 std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& scene) {
   Plan plan = last;
   const auto more = [](int samples, double times) {
@@ -201,9 +212,9 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
     plan.field->outgoing.degree = std::min(kMaxLightFieldDegree, plan.field->outgoing.degree + 2);
     growth.triangles = std::sqrt(growth.triangles);  // the other half of the way
   }
-  if (plan.field && !step_.samples) {
+  if (plan.field && !fixed_.reflected) {
     plan.field->outgoing.rays = more(plan.field->outgoing.rays, growth.reflected);
-  } else if (!step_.samples) {
+  } else if (!plan.field && !plan.radiosity && !fixed_.direct) {
     plan.samples = more(last.samples, growth.direct);
     plan.noise = last.noise / std::sqrt(growth.direct);
     plan.lamp_samples = more(last.lamp_samples, growth.direct);
@@ -226,14 +237,23 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   }
   if (plan.field)
     predict_grown_field(plan, growth.triangles);
+  else if (plan.links)
+    grow_links(plan, {growth.reflected, growth.reflected, growth.points, fixed_.eps, pass_reason()}, scene);
+  else if (plan.radiosity)
+    grow_radiosity(plan, {growth.direct, growth.reflected, growth.points, fixed_.eps, pass_reason()}, scene);
   else
     plan.prediction = predict(plan, scene);
   if (plan.prediction.memory_bytes > limits_.memory_mb << 20) {
-    return end(Ending::floor,
-               "reached " + percent(all_.back().high) + "; more triangles would need more than /limits/memory_mb");
+    const Growth half{std::sqrt(growth.direct), std::sqrt(growth.reflected), std::sqrt(growth.points),
+                      std::sqrt(growth.triangles)};
+    const bool points = plan.radiosity && !plan.field;
+    if (points && cost(half) > kLeastGrowth) return grown(last, half, scene);
+    return end(Ending::floor, "reached " + percent(all_.back().high) + "; " +
+                                  (points ? "finer points, more rays or " : "") +
+                                  "more triangles would need more than /limits/memory_mb");
   }
   for (Decision& d : plan.decisions) {
-    const std::string reason = "pass " + std::to_string(all_.size() + 1) + ", from the error of the last one";
+    const std::string reason = pass_reason();
     if (d.decision == "samples") d = {"samples", std::to_string(plan.samples), reason};
     if (d.decision == "degree") d = {"degree", std::to_string(plan.field->outgoing.degree), reason};
     if (d.decision == "rays of a vertex") d = {d.decision, std::to_string(plan.field->outgoing.rays), reason};
@@ -265,6 +285,14 @@ std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene) {
   return plan;
 }
 
+const char* Passes::fixed_knob() const {
+  const ErrorSources& s = all_.back().sources;
+  if (fixed_.reflected && (kind_.point == 0 || s.noise_of_reflections >= std::max(s.points, s.interpolation)))
+    return kind_.rays;
+  if (fixed_.points && s.points >= s.interpolation) return "/steps/0/points/radius";
+  return fixed_.triangles ? "/steps/0/subdivide" : fixed_.reflected ? kind_.rays : nullptr;
+}
+
 std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
   const PassRecord& now = all_.back();
   if (last.field && last.field->carried && !transport_met()) {
@@ -288,6 +316,10 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
   if (all_.size() >= kMostPasses) return end(Ending::floor, floor + "the last of ten passes has ended");
   if (stuck()) return end(Ending::floor, floor + "neither more rays nor more triangles lower it; " + kind_.last_knob);
 
+  if (promise_.target_error && now.sources.bounce_tail > *promise_.target_error) {
+    return end(Ending::floor, floor + "reflections left out are " + percent(now.sources.bounce_tail) +
+                                  " of the light; a higher /steps/0/bounces lowers it");
+  }
   if (simplified_too_far(last)) {
     Plan plan = last;
     *plan.field->target *= kLessTarget;
@@ -305,15 +337,14 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
     const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
     if (const Growth wanted = towards(aim); cost(wanted) < most) growth = wanted;
   }
-  if (cost(growth) < 1.05 && !bands_missing(last)) {
-    const bool free_samples = !step_.samples;
-    if (free_samples && free_triangles()) {
-      growth = {kLeastGrowth, kLeastGrowth, kLeastGrowth};
-    } else {
+  constexpr double kIdle = 0.9;  // of the squared error: what is left open does not lower it
+  const bool idle = cost(growth) < 1.05 || (fixed_knob() != nullptr && predicted(growth) > kIdle * predicted({}));
+  if (idle && !bands_missing(last)) {
+    if (const char* knob = fixed_knob()) {
       return end(promise_.target_error ? Ending::floor : Ending::time_spent,
-                 "reached " + percent(all_.back().high) + "; what is left comes from what the recipe fixes: " +
-                     (free_samples ? "/steps/0/subdivide" : kind_.rays));
+                 "reached " + percent(all_.back().high) + "; what is left comes from what the recipe fixes: " + knob);
     }
+    growth = {kLeastGrowth, kLeastGrowth, free_points() ? kLeastGrowth : 1, kLeastGrowth};
   }
   return grown(last, growth, scene);
 }

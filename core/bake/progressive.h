@@ -4,9 +4,11 @@
 //
 //   noise of direct and of reflected light ~ 1 / sqrt(rays a vertex that each takes),  interpolation ~ triangles^-p,
 //   cost ~ triangles (a + rays of direct light + b rays of reflected light)
-// Of all growths of the three that reach a wanted error the cheapest is taken. Passes begin afresh: with a growth of
-// four the earlier ones cost a third of the last. The newest is delivered, not the one whose certificate was luckiest.
-// Repeat  a target alone gives the same passes and bytes on any machine that is not stopped by limits.wall_s; a time
+// Where reflected light lives on points (core/meshless) its rays are theirs, they cost some themselves, and what is
+// read of them is off by points^-q. Of all growths of these that reach a wanted error the cheapest is taken. Passes
+// begin afresh: with a growth of four the earlier ones cost a third of the last. The newest is delivered, not the one
+// whose certificate was luckiest. Repeat  a target alone gives the same passes and bytes on any machine that is not
+// stopped by limits.wall_s; a time
 //         budget cannot.
 
 #include <cstdint>
@@ -16,6 +18,7 @@
 
 #include "core/bake/certificate.h"
 #include "core/bake/error_sources.h"
+#include "core/bake/pass_kinds.h"
 #include "core/bake/plan.h"
 #include "core/bake/recipe.h"
 
@@ -28,20 +31,11 @@ struct PassRecord {
   std::uint64_t rays = 0, bounce_rays = 0;      // of all, those between surfaces
   double seconds = 0, certificate_seconds = 0;  // all of it, and the part that does not grow with the work
   double elapsed_s = 0;                         // of the bake when the pass ended
+  std::uint64_t points = 0, gathered = 0;       // that reflected light lives on; those of them with rays of their own
   double relrmse = 0, low = 0, high = 0;        // transport, with its interval
   std::optional<double> own_relrmse, own_high;  // under the job's own light in full
   ErrorSources sources;
 };
-
-/// What differs between the steps that are baked in passes.
-struct PassKind {
-  double gather_ray = 4, triangle = 300;  // costs of a ray between surfaces and of a triangle, in shadow rays: measured
-  double power = 0.75;                    // of interpolation over triangles, until two passes tell
-  const char* rays = "/steps/0/samples";  // the knob of the noise,
-  const char* last_knob = "a higher /steps/0/subdivide/max_depth may";  // and what is left where none helps
-};
-/// Of a light field: `order` of a record is its degree, `samples` the rays of a vertex, `bounce_rays` all of them.
-PassKind light_field_passes();
 
 /// What became of a promise.
 struct Outlook {
@@ -52,8 +46,7 @@ struct Outlook {
 /// The passes of one bake.
 class Passes {
  public:
-  /// The step says what the recipe fixes.
-  Passes(const Promise&, const PrtStep&, const Limits&, const PassKind& = {});
+  Passes(const Promise&, const FixedKnobs&, const Limits&, const PassKind& = {});
 
   void add(const PassRecord&);
   const std::vector<PassRecord>& all() const { return all_; }
@@ -70,15 +63,16 @@ class Passes {
 
  private:
   struct Growth {
-    double direct = 1, reflected = 1, triangles = 1;  // rays a vertex, and triangles
+    double direct = 1, reflected = 1, points = 1, triangles = 1;  // rays, and where they start
   };
   std::optional<Plan> end(Outlook::Ending, std::string reason);
   bool transport_met() const;
   bool own_light_bound() const;  // the target bounds the job's own light too: no order was asked for
   bool stuck() const;
-  bool free_triangles() const;  // the recipe leaves their number open
+  bool free_triangles() const { return !fixed_.triangles; }
+  bool free_points() const { return kind_.point > 0 && !fixed_.points; }
   double time_growth() const;
-  Growth rays_for(double noise_squared) const;
+  Growth rays_for(double noise_squared, const Growth& places) const;
   double cost(Growth) const;  // in costs of the last pass
   double predicted(Growth) const;
   double interpolation_power() const;
@@ -88,9 +82,11 @@ class Passes {
   bool simplified_too_far(const Plan& last) const;
   std::optional<Plan> higher_order(const Plan& last, const Scene&);
   std::optional<Plan> grown(const Plan& last, Growth, const Scene&);
+  std::string pass_reason() const;
+  const char* fixed_knob() const;  // that hinders
 
   Promise promise_;
-  PrtStep step_;
+  FixedKnobs fixed_;
   Limits limits_;
   PassKind kind_;
   std::vector<PassRecord> all_;

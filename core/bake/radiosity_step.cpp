@@ -4,8 +4,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/bake/bounce_tail.h"
 #include "core/bake/direct_source.h"
-#include "core/bake/transport.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/direct_light.h"
@@ -15,29 +15,6 @@
 
 namespace kiln {
 namespace {
-
-/// What the qualities spend. The error that each is for was measured with core/meshless on the shared references.
-struct RadiosityEffort {
-  const char* reason;
-  std::uint64_t triangles;
-  float threshold;
-  DirectRays direct;
-  int rays;
-  float eps;
-  double points;  // times the automatic number
-};
-
-RadiosityEffort radiosity_effort(Quality quality) {
-  switch (quality) {
-    case Quality::draft:
-      return {"the draft quality", 10'000, 2e-4F, {{16, 64}, 64}, 128, 0.05F, 0.25};
-    case Quality::standard:
-      return {"the standard quality", 40'000, 5e-5F, {{32, 128}, 256}, 512, 0.02F, 1};
-    case Quality::finest:
-      break;
-  }
-  return {"the final quality", 160'000, 1e-5F, {{64, 512}, 1024}, 1024, 0.01F, 4};
-}
 
 double mean_of(const std::vector<Vec3f>& values) {
   double sum = 0;
@@ -52,12 +29,8 @@ bool has_lamps(const Scene& scene) {
   });
 }
 
-/// Seconds and rays of direct light at one point, by a pilot over the surface.
-struct Pilot {
-  double seconds = 0, rays = 0;
-};
-
-Pilot pilot_direct(const Tracer& tracer, const Plan& plan, const Environment* sky, Threads& threads) {
+/// Seconds and rays of direct light at one point (lamp_seconds, lamp_rays), by a pilot over the surface.
+PointCosts pilot_direct(const Tracer& tracer, const Plan& plan, const Environment* sky, Threads& threads) {
   const DirectLight light(tracer, sky, plan.radiosity->direct);
   std::vector<TransferPoint> points;
   for (const SurfaceSample& s : sample_surface(tracer.scene().mesh, 256, 0x70696c6f74)) {
@@ -70,21 +43,66 @@ Pilot pilot_direct(const Tracer& tracer, const Plan& plan, const Environment* sk
   light_at(points, light, 1, rays, threads);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const auto n = static_cast<double>(points.size());
-  return {seconds / n, static_cast<double>(rays) / n};
+  return {.lamp_rays = static_cast<double>(rays) / n, .lamp_seconds = seconds / n};
 }
 
 /// A count of what may be beyond counting.
 std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
 
-void predict_radiosity(Plan& plan, const Scene& scene, const Pilot& pilot, double points) {
+/// Vertices that gather twice to tell where errors come from: a twentieth of the work at most, 64 at least.
+std::size_t probes_for(double points) {
+  return static_cast<std::size_t>(std::clamp(points / 40, 64.0, double{kNoiseProbes}));
+}
+
+/// Direct light in two independent draws: the second minus the first.
+Probes draw_twice(const Mesh& mesh, const std::vector<std::uint32_t>& vertices, const DirectLight& light,
+                  std::uint64_t seed, std::uint64_t& rays, Threads& threads) {
+  const std::vector<TransferPoint> at = points_at(mesh, vertices);
+  const std::vector<Vec3f> first = light_at(at, light, mix64(seed ^ 0x647261776131ULL), rays, threads),
+                           second = light_at(at, light, mix64(seed ^ 0x647261776132ULL), rays, threads);
+  Probes out{.vertices = vertices, .difference = {}};
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Vec3f d = second[i] - first[i];
+    out.difference.insert(out.difference.end(), {d.x, d.y, d.z});
+  }
+  return out;
+}
+
+/// Of what vertices read, r, and two gathers of their own, a and b: the noise of r is that of a gather times its
+/// spread, and (a - r)(b - r) has it in the mean too, with the square of what reading from elsewhere is off by.
+void weigh(const std::vector<GatherProbe>& probes, const std::vector<std::uint32_t>& vertices, SolvedRadiosity& out) {
+  double sum = 0;
+  out.noise.reflected.vertices = vertices;
+  for (const GatherProbe& p : probes) {
+    const Vec3f d = (p.second - p.first) * std::sqrt(p.spread);
+    out.noise.reflected.difference.insert(out.noise.reflected.difference.end(), {d.x, d.y, d.z});
+    sum += double{dot(p.first - p.read, p.second - p.read)} - 0.5 * double{dot(d, d)};
+  }
+  if (probes.empty()) out.noise.reflected.vertices.clear();
+  out.points_squared = probes.empty() ? 0 : std::max(0.0, sum / (3 * static_cast<double>(probes.size())));
+}
+
+double points_of(const Plan& plan, const Scene& scene) {
+  const PointPlacement& p = plan.radiosity->points;
+  return expected_points(surface_area(scene.mesh), std::ldexp(double{p.radius}, 1 - p.levels));
+}
+
+std::string points_text(const Plan& plan, const Scene& scene) {
+  return "about " + short_text(points_of(plan, scene)) + " on " + std::to_string(plan.radiosity->points.levels) +
+         " levels";
+}
+
+void predict_radiosity(Plan& plan, const Scene& scene) {
+  const PointCosts& pilot = plan.costs;
+  const double points = points_of(plan, scene);
   constexpr double kReflectedPrice = 3.4;  // of a gathering ray, as in forecast.cpp
   const double input = static_cast<double>(scene.mesh.position.size());
   const double triangles = static_cast<double>(plan.split ? plan.subdivide.triangles : scene.mesh.triangles.size());
   const double vertices = plan.split ? std::max(input, 0.55 * triangles) : input;
   const double asked = plan.split ? vertices + 1.5 * triangles + triangles / kRoughRays : vertices;
-  const double direct = asked * pilot.rays + points * pilot.rays / 4;
+  const double direct = asked * pilot.lamp_rays + points * pilot.lamp_rays / 4;
   const double gathered = points * plan.radiosity->rays;
-  const double price = pilot.rays > 0 ? pilot.seconds / pilot.rays : 0;
+  const double price = pilot.lamp_rays > 0 ? pilot.lamp_seconds / pilot.lamp_rays : 0;
   double pixels = 0, files = 0;
   for (const Image& image : scene.images) {
     pixels += static_cast<double>(image.rgba.size());
@@ -103,12 +121,33 @@ void predict_radiosity(Plan& plan, const Scene& scene, const Pilot& pilot, doubl
 
 }  // namespace
 
-Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality quality, const Environment* sky,
-                         Threads& threads) {
-  const RadiosityEffort effort = radiosity_effort(quality);
+/// The error that each is for was measured with core/meshless on the shared references.
+RadiosityEffort radiosity_effort(Quality quality) {
+  switch (quality) {
+    case Quality::draft:
+      return {"the draft quality", 10'000, 2e-4F, {{16, 64}, 64}, 128, 0.05F, 0.25};
+    case Quality::standard:
+      return {"the standard quality", 40'000, 5e-5F, {{32, 128}, 256}, 512, 0.02F, 1};
+    case Quality::finest:
+      break;
+  }
+  return {"the final quality", 160'000, 1e-5F, {{64, 512}, 1024}, 1024, 0.01F, 4};
+}
+
+RadiosityEffort radiosity_effort(const Promise& promise) {
+  const double target = promise.target_error.value_or(0.05);
+  const int rays = std::clamp(16 * static_cast<int>(std::lround(0.4 / target)), 64, 256);
+  const auto triangles = static_cast<std::uint64_t>(std::clamp(100 / target, 500.0, 10'000.0));
+  const double storage = std::clamp(promise.target_error.value_or(0) / 10, 1e-3, 5e-3);
+  return {"the first pass", triangles, 0, {{rays / 4, rays}, rays}, rays, 0.05F, 0.25, storage};
+}
+
+Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, const RadiosityEffort& effort,
+                         const Environment* sky, Threads& threads) {
   Plan plan;
   plan.order = 0;
   plan.raw_bits = 16;
+  plan.compression = effort.storage;
   plan.encoding.form = PrtStep::Encoding::Form::raw;
   plan.lamps = has_lamps(scene);
   plan.radiosity.emplace();
@@ -123,13 +162,12 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality 
   r.points.wanted = static_cast<std::uint64_t>(effort.points * static_cast<double>(r.points.wanted));
   r.points = resolve(r.points, scene);
   const double finest = std::ldexp(double{r.points.radius}, 1 - r.points.levels);
-  const double points = expected_points(surface_area(scene.mesh), finest);
 
   const std::string asked = "asked for by the recipe";
   decide(plan, "light", sky == nullptr ? "lamps" : sky->name,
          plan.lamps ? "the scene has emitters or punctual lights of its own" : "the scene has no light of its own");
   decide(plan, "scheme", "rows", "the transport operator is traced once; bounces are sparse sweeps");
-  decide(plan, "points", "about " + short_text(points) + " on " + std::to_string(r.points.levels) + " levels",
+  decide(plan, "points", points_text(plan, scene),
          step.radius
              ? asked
              : effort.reason + std::string(" takes radii from ") + short_text(r.points.radius * scene.frame.scale) +
@@ -153,13 +191,41 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, Quality 
          : step.subdivide.triangles       ? asked
                                           : effort.reason + std::string(" adds triangles where direct light changes"));
   const Tracer tracer(scene, threads);
-  predict_radiosity(plan, scene, pilot_direct(tracer, plan, sky, threads), points);
+  plan.costs = pilot_direct(tracer, plan, sky, threads);
+  predict_radiosity(plan, scene);
   return plan;
 }
 
-Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const RadiosityHooks& hooks,
-                              BakeLog& log, Threads& threads) {
+void grow_radiosity(Plan& plan, const RadiosityGrowth& growth, const Scene& scene) {
+  static constexpr double kMostRays = 65536;
+  const auto more = [](int rays, double times) {
+    return static_cast<int>(std::min(kMostRays, std::ceil(rays * times / 16) * 16));
+  };
+  Radiosity& r = *plan.radiosity;
+  r.rays = more(r.rays, growth.reflected);
+  if (growth.direct > 1) {
+    LampRays& lamps = r.direct.lamps;
+    lamps = {more(lamps.few, growth.direct), more(lamps.many, growth.direct)};
+    plan.costs.lamp_seconds *= growth.direct, plan.costs.lamp_rays *= growth.direct;
+    r.direct.sky = more(r.direct.sky, growth.direct);
+  }
+  // Points lie as the root of the area of each apart, and what they predict is off by about as much.
+  const auto nearer = static_cast<float>(1 / std::sqrt(growth.points));
+  r.points.radius *= nearer;
+  if (!growth.eps_fixed) r.eps *= nearer;
+  predict_radiosity(plan, scene);
+  for (Decision& d : plan.decisions) {
+    if (d.decision == "rays" && growth.reflected > 1) d = {d.decision, std::to_string(r.rays), growth.reason};
+    if (growth.points == 1) continue;
+    if (d.decision == "points") d = {d.decision, points_text(plan, scene), growth.reason};
+    if (d.decision == "eps_irradiance" && !growth.eps_fixed) d = {d.decision, short_text(double{r.eps}), growth.reason};
+  }
+}
+
+SolvedRadiosity solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const RadiosityHooks& hooks,
+                                     BakeLog& log, Threads& threads) {
   Radiosity params = *plan.radiosity;
+  SolvedRadiosity out;
   log.begin("direct", plan.grid ? 0.3 : 0.55);
   {
     const Tracer tracer(scene, threads);
@@ -200,6 +266,10 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
       params.known_direct[v] = Vec3f{std::max(0.0F, x[0]), std::max(0.0F, x[1]), std::max(0.0F, x[2])} / scale;
     }
     scene.mesh = std::move(fine.mesh);
+    if (hooks.sources) {
+      params.probes = choose_probes(scene.mesh, probes_for(points_of(plan, scene)));
+      out.noise.direct = draw_twice(scene.mesh, params.probes, light, params.seed, rays, threads);
+    }
     log.count_rays(rays);
   }
 
@@ -207,10 +277,9 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
   const Tracer tracer(scene, threads);
   const RadiosityResult r = solve_radiosity(tracer, sky, params, threads);
   log.count_rays(r.stats.direct_rays + r.stats.gather_rays);
-  std::uint64_t gathered = 0, placed = 0;
-  for (const std::uint32_t n : r.stats.gathered) gathered += n;
-  for (const std::uint32_t n : r.stats.points) placed += n;
-  decide(plan, "gathered", std::to_string(gathered) + " of " + std::to_string(placed) + " points",
+  for (const std::uint32_t n : r.stats.gathered) out.gathered += n;
+  for (const std::uint32_t n : r.stats.points) out.points += n;
+  decide(plan, "gathered", std::to_string(out.gathered) + " of " + std::to_string(out.points) + " points",
          "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
              " vertices gather for themselves; " + std::to_string(r.stats.sweeps) + " sweeps");
 
@@ -218,9 +287,15 @@ Transfer solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, 
   for (std::size_t v = 0; v < r.direct.size(); ++v) light.push_back(r.direct[v] + r.indirect[v]);
   if (hooks.lit) hooks.lit(tracer, r.surface.get(), light);
 
-  Transfer out{.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
-  out.coefficients.reserve(3 * light.size());
-  for (const Vec3f& x : light) out.coefficients.insert(out.coefficients.end(), {x.x, x.y, x.z});
+  out.transfer = {.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
+  out.transfer.coefficients.reserve(3 * light.size());
+  for (const Vec3f& x : light) out.transfer.coefficients.insert(out.transfer.coefficients.end(), {x.x, x.y, x.z});
+  out.gather_rays = r.stats.gather_rays;
+  if (!hooks.sources) return out;
+  if (params.bounces > 0) out.tail = r.stats.tail;
+  if (params.bounces == 0) out.tail = measure_bounces(tracer, plan.lamps, 1, threads).left;
+  if (params.bounces < 0) out.tail = kTail;
+  weigh(r.probes, params.probes, out);
   return out;
 }
 

@@ -335,17 +335,19 @@ void check_field_promise(const Recipe& recipe, Errors& errors) {
   }
 }
 
+void check_points_promise(const RadiosityStep& step, Errors& errors) {
+  const bool split_fixed = step.subdivide.mode == PrtStep::Subdivision::Mode::off || step.subdivide.triangles;
+  if (step.rays && step.radius && split_fixed) {
+    errors.push_back({"/quality", "leaves nothing to spend: rays, radius of points and triangles of the step are given",
+                      "", "a promise, or all three knobs"});
+  }
+}
+
 /// A promise is about the certificate, and needs something to spend on.
 void check_promise(const Recipe& recipe, Errors& errors) {
   if (!recipe.promise) return;
-  if (recipe.radiosity) {
-    errors.push_back(
-        {"/quality", "cannot be promised of a radiosity step: it is baked in one pass", "", "draft, standard, final"});
-  }
-  if (recipe.transport) {
-    errors.push_back(
-        {"/quality", "cannot be promised of a transport step: it is baked in one pass", "", "draft, standard, final"});
-  }
+  if (recipe.radiosity) check_points_promise(*recipe.radiosity, errors);
+  if (recipe.transport) check_points_promise(recipe.transport->surface, errors);
   if (recipe.light_field) check_field_promise(recipe, errors);
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",

@@ -167,7 +167,7 @@ std::string recipe_schema() {
         "type": "object", "additionalProperties": false, "minProperties": 1,
         "description": "What the bake must reach; of both, whichever comes first.",
         "properties": {
-          "target_error": {"description": "relRMSE that the upper end of the certificate's interval must not exceed; of a light field towards eyes, and simplified until it does", "type": "number", "minimum": 1e-4, "maximum": 1},
+          "target_error": {"description": "relRMSE that the upper end of the certificate's interval must not exceed; of a light field towards eyes, and simplified until it does; of transport that of links, relative to the root mean square of each lamp's light", "type": "number", "minimum": 1e-4, "maximum": 1},
           "time_budget_s": {"description": "seconds of the whole bake, kept within 20 %", "type": "number", "minimum": 0.01, "maximum": 2592000}
         }
       }]

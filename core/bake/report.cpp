@@ -131,16 +131,24 @@ ordered_json grid_promise(const Promise& promise, const GridOutcome& grid) {
   return out;
 }
 
+ordered_json links_sources(const LinkSources& s) {
+  return {{"noise", s.noise}, {"links", s.links}, {"senders", s.senders}, {"interpolation", s.interpolation}};
+}
+
 ordered_json links_certificate_object(const std::optional<LinksCertificate>& certificate) {
   if (!certificate) return nullptr;
   ordered_json out = error_object(certificate->error);
-  out["of_rms"] = certificate->of_rms;
+  const ErrorStats& rms = certificate->of_rms;
+  out["of_rms"] = rms.relrmse;
+  out["of_rms_interval"] = {rms.interval_low, rms.interval_high};
+  out["sources"] = links_sources(certificate->sources);
   out["lamps"] = ordered_json::array();
   for (std::size_t k = 0; k < certificate->lamps.size(); ++k) {
     const Vec3d& at = certificate->lamps[k];
     out["lamps"].push_back(
         {{"place", {at.x, at.y, at.z}},
          {"relrmse", k < certificate->error.by_lighting.size() ? certificate->error.by_lighting[k] : 0},
+         {"of_rms", k < rms.by_lighting.size() ? rms.by_lighting[k] : 0},
          {"mean_light", certificate->mean_light[k]}});
   }
   out["dark"] = certificate->dark;
@@ -321,7 +329,7 @@ ordered_json prediction_object(const Prediction& p) {
           {"seconds", p.seconds},     {"memory_bytes", p.memory_bytes}, {"artifact_bytes", p.artifact_bytes}};
 }
 
-ordered_json sources_object(const ErrorSources& s) {
+ordered_json sources_object(const ErrorSources& s, const Plan& plan) {
   ordered_json out = {{"noise", s.noise},
                       {"noise_of_reflections", s.noise_of_reflections},
                       {"interpolation", s.interpolation},
@@ -329,11 +337,12 @@ ordered_json sources_object(const ErrorSources& s) {
                       {"quantisation", s.quantisation},
                       {"merging", s.merging},
                       {"compression", s.compression}};
+  if (plan.radiosity) out["points"] = s.points;
   if (s.truncation) out["truncation"] = *s.truncation;
   return out;
 }
 
-ordered_json pass_list(const Passes& passes) {
+ordered_json pass_list(const Passes& passes, const Plan& plan) {
   ordered_json list = ordered_json::array();
   for (const PassRecord& p : passes.all()) {
     list.push_back({{"order", p.order},
@@ -346,7 +355,10 @@ ordered_json pass_list(const Passes& passes) {
                     {"seconds", p.seconds},
                     {"relrmse", p.relrmse},
                     {"interval", {p.low, p.high}},
-                    {"sources", sources_object(p.sources)}});
+                    {"sources", sources_object(p.sources, plan)}});
+    if (!plan.radiosity) continue;
+    list.back()["points"] = p.points;
+    list.back()["gathered"] = p.gathered;
   }
   return list;
 }
@@ -373,7 +385,28 @@ ordered_json field_pass_list(const Passes& passes) {
   return list;
 }
 
-ordered_json promise_object(const Promise& promise, const Passes& passes, bool field) {
+ordered_json links_pass_list(const Passes& passes) {
+  ordered_json list = ordered_json::array();
+  for (const PassRecord& p : passes.all()) {
+    const ErrorSources& s = p.sources;
+    list.push_back(
+        {{"rays_of_a_row", p.bounce_samples},
+         {"senders", p.points},
+         {"receivers", p.gathered},
+         {"triangles", p.triangles},
+         {"vertices", p.vertices},
+         {"rays", p.rays},
+         {"seconds", p.seconds},
+         {"of_rms", p.relrmse},
+         {"interval", {p.low, p.high}},
+         {"sources", {{"noise", s.noise}, {"senders_and_links", s.points}, {"interpolation", s.interpolation}}}});
+  }
+  return list;
+}
+
+ordered_json promise_object(const ReportInput& in) {
+  const Promise& promise = in.recipe.promise;
+  const Passes& passes = in.passes;
   constexpr const char* kEndings[] = {"target_met", "time_spent", "floor"};
   ordered_json out;
   if (promise.target_error) out["target_error"] = *promise.target_error;
@@ -381,7 +414,7 @@ ordered_json promise_object(const Promise& promise, const Passes& passes, bool f
   out["kept"] = passes.kept();
   out["ended_by"] = kEndings[static_cast<int>(passes.outlook().ending)];
   out["reason"] = passes.outlook().reason;
-  out["passes"] = field ? field_pass_list(passes) : pass_list(passes);
+  out["passes"] = in.field ? field_pass_list(passes) : in.links ? links_pass_list(passes) : pass_list(passes, in.plan);
   return out;
 }
 
@@ -406,12 +439,10 @@ std::string report_json(const ReportInput& in) {
                       {"warnings", warning_list(in.input)},
                       {"certificate", certificate_object(in.certificate)}};
   if (in.merge) out["merge"] = merge_object(*in.merge);
-  if (in.sources) out["error_sources"] = sources_object(*in.sources);
+  if (in.sources) out["error_sources"] = sources_object(*in.sources, in.plan);
   if (in.grid) out["grid"] = grid_object(*in.grid, *in.plan.grid);
   if (in.links) out["links"] = links_object(*in.links);
-  if (in.recipe.promise)
-    out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid)
-                             : promise_object(in.recipe.promise, in.passes, in.field.has_value());
+  if (in.recipe.promise) out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in);
   if (in.field) out["lightfield"] = field_object(*in.field);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
   if (in.meshless) out["meshless"] = meshless_object(*in.meshless);

@@ -44,25 +44,6 @@ Subdivided bake_direct(const Tracer& tracer, const Plan& plan, DirectSource& sou
   return subdivide(base_mesh(tracer, plan, light, plan.bounces > 0, threads), light, plan.subdivide, threads);
 }
 
-constexpr std::size_t kNoiseProbes = 256;
-
-/// Vertices in proportion to the area around them.
-std::vector<std::uint32_t> choose_probes(const Mesh& mesh, std::size_t count) {
-  std::vector<std::uint32_t> out;
-  for (const SurfaceSample& s : sample_surface(mesh, count, 0x70726f6265ULL)) {
-    const Triangle& t = mesh.triangles[s.triangle];
-    out.push_back(s.u + s.v < 0.5F ? t[0] : s.u > s.v ? t[1] : t[2]);
-  }
-  return out;
-}
-
-std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
-  const std::vector<std::uint32_t> face = widest_faces(mesh);
-  std::vector<TransferPoint> out;
-  for (const std::uint32_t v : vertices) out.push_back(vertex_point(mesh, v, face[v]));
-  return out;
-}
-
 /// Direct light in two independent draws: the second minus the first, shaped as Probes.
 std::vector<float> draw_twice(const Tracer& tracer, const std::vector<TransferPoint>& points, const Plan& plan,
                               const TransferRays& rays, Threads& threads) {
@@ -158,6 +139,22 @@ void reflect(const MeshlessWork& work, DirectAtVertices direct, Transport& out) 
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> choose_probes(const Mesh& mesh, std::size_t count) {
+  std::vector<std::uint32_t> out;
+  for (const SurfaceSample& s : sample_surface(mesh, count, 0x70726f6265ULL)) {
+    const Triangle& t = mesh.triangles[s.triangle];
+    out.push_back(s.u + s.v < 0.5F ? t[0] : s.u > s.v ? t[1] : t[2]);
+  }
+  return out;
+}
+
+std::vector<TransferPoint> points_at(const Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  const std::vector<std::uint32_t> face = widest_faces(mesh);
+  std::vector<TransferPoint> out;
+  for (const std::uint32_t v : vertices) out.push_back(vertex_point(mesh, v, face[v]));
+  return out;
+}
 
 Mesh base_mesh(const Tracer& tracer, const Plan& plan, const ValueSource& source, bool bounces, Threads& threads) {
   const std::uint64_t input = tracer.scene().mesh.triangles.size(),

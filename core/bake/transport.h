@@ -29,6 +29,11 @@ struct NoiseProbes {
   Probes direct, reflected;
 };
 
+inline constexpr std::size_t kNoiseProbes = 256;
+/// So many vertices, in proportion to the area around them, and the places that vertices are lit at.
+std::vector<std::uint32_t> choose_probes(const Mesh&, std::size_t count);
+std::vector<TransferPoint> points_at(const Mesh&, const std::vector<std::uint32_t>& vertices);
+
 struct Transport {
   std::optional<MergeOutcome> merge;  // as planned
   Transfer transfer;                  // of scene.mesh's vertices

@@ -55,6 +55,13 @@ struct LinkStats {
   double left = 0;        // of the probes' light after the sweeps, before the tail
 };
 
+/// What rows lose, of the root mean square of the light of the probe lamps over places: `noise` of their rays in what
+/// is read there, from a second draw of the row that counts most; `links`, to groups instead of single senders.
+struct LinkErrors {
+  double noise = 0, links = 0;
+  std::uint64_t rays = 0;
+};
+
 class LinkBuilder {
  public:
   /// Does steps 1 to 4. Keeps a reference to the tracer.
@@ -67,6 +74,10 @@ class LinkBuilder {
   /// lamp's mean light): value[place * probes + probe]. Places that no receiver reaches are told 0.
   std::size_t probes() const;
   std::vector<float> probe_light(std::span<const TransferPoint>, Threads&) const;
+
+  LinkErrors errors_at(std::span<const TransferPoint>, Threads&) const;
+  /// What any places read, as vertices do that see some receiver; nothing at others.
+  std::vector<std::vector<RowTerm>> readings_at(std::span<const TransferPoint>, Threads&) const;
 
   /// Step 5 for the vertices of a mesh on the same surface, and the whole operator.
   LightLinks finish(const Mesh&, Threads&);

@@ -33,7 +33,6 @@ void LinkBuilder::Work::light_probes(Threads& threads) {
   for (const auto& e : direct) {
     std::vector<Vec3f> x = solve_nodes(links, e);
     limit.push_back(static_cast<float>(params.eps * light_over_area(x, area) / std::max(1.0, whole)));
-    x.resize(links.senders);
     lamp.push_back(std::move(x));
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 // What making links works on (link_builder.h); its own files alone include this. link_builder.cpp places points and
-// makes rows, link_refine.cpp chooses receivers, link_vertices.cpp says what the vertices of a mesh read.
+// makes rows, link_refine.cpp chooses receivers, link_vertices.cpp says what the vertices of a mesh read,
+// link_errors.cpp what rows lose.
 
 #include <optional>
 #include <span>
@@ -32,7 +33,7 @@ struct LinkBuilder::Work {
   SenderTree tree;
   std::vector<std::uint32_t> receiver;   // the point of each gathered row
   std::vector<std::uint32_t> link_row;   // of each gathered row: the row of links that vertices read, or kUnread
-  std::vector<std::vector<Vec3f>> lamp;  // of each probe: light at the senders, all reflections
+  std::vector<std::vector<Vec3f>> lamp;  // of each probe: light at the nodes, all reflections
   std::vector<Vec3f> gathered;           // [row * probes + probe]: what one more reflection brings
   std::vector<float> limit;              // of each probe
   std::vector<std::uint32_t> read_row;   // the gathered row of each receiver that is read
@@ -85,6 +86,8 @@ struct LinkBuilder::Work {
   /// The points of a level around points of the level above.
   std::vector<std::uint32_t> children_of(const std::vector<std::uint32_t>& parents, std::size_t level) const;
   std::vector<float> probe_light(std::span<const TransferPoint> places, Threads&) const;
+
+  LinkErrors errors_at(std::span<const TransferPoint> places, Threads&) const;
 
   LightLinks finish(const Mesh& mesh, Threads&);
   /// Vertices that see no receiver well enough take what the nearest sender receives.

@@ -21,6 +21,7 @@ constexpr float kChildReach = 2;    // of the parent level's R: points that a fl
 constexpr int kPlainSweeps = 4;     // from whose last two the factor is known by which light shrinks at a bounce
 constexpr double kFaintest = 0.01;  // at most this much of kTail may change in a sweep: some light shrinks slower
 constexpr double kRounding = 3e-7;  // of the light: sweeps change it no less
+constexpr std::uint64_t kFirstDraw = 0x70726f626531, kSecondDraw = 0x70726f626532;  // of the probes
 
 double mean_of(const Vec3f& x) { return (double{x.x} + double{x.y} + double{x.z}) / 3; }
 float largest(const Vec3f& x) { return std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}); }
@@ -249,6 +250,7 @@ class Solver {
       }
       out_.stats.sweeps = sweep + 1;
       const bool plain = !automatic || sweep < kPlainSweeps;
+      if (!automatic) out_.stats.tail = beyond(change, before > 0 ? before : light - change, light);
       if (plain) ratio = before > 0 ? std::min(1.0, change / before) : 0;
       before = change;
       const bool done = automatic && change <= light * std::max(kRounding, kTail * std::min(1 - ratio, kFaintest));
@@ -262,7 +264,39 @@ class Solver {
     }
     if (automatic) spread(gathered, total);
     read_vertices(gathered, total);
+    probe(total);
     out_.surface->set_light(std::move(total));
+  }
+
+  /// Share of the light in a geometric series whose last two terms are known.
+  static double beyond(double last, double before, double light) {
+    constexpr double kSlowest = 0.99;
+    const double ratio = before > 0 ? std::min(kSlowest, last / before) : 0;
+    return light > 0 ? last * ratio / (1 - ratio) / light : 0;
+  }
+
+  /// What some vertices would gather for themselves, twice, beside what they read.
+  void probe(const std::vector<Vec3f>& total) {
+    std::vector<TransferPoint> at;
+    for (const std::uint32_t v : params_.probes) at.push_back(vertices_[v]);
+    out_.probes.resize(at.size());
+    for (const bool again : {false, true}) {
+      GatherRows own(out_.surface->paths(), params_.rays, mix64(params_.seed ^ (again ? kSecondDraw : kFirstDraw)));
+      own.add(at, threads_, out_.stats.gather_rays);
+      for (std::size_t i = 0; i < at.size(); ++i)
+        (again ? out_.probes[i].second : out_.probes[i].first) = own.apply(i, total);
+    }
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      out_.probes[i].read = out_.indirect[params_.probes[i]];
+      out_.probes[i].spread = spread_of(params_.probes[i]);
+    }
+  }
+
+  float spread_of(std::uint32_t vertex) const {
+    if (nearest_[vertex] != Senders::kNone || !at_vertices_->any(vertex)) return 1;
+    float sum = 0;
+    for (const BasisTerm& t : at_vertices_->terms(vertex)) sum += t.value * t.value;
+    return sum;
   }
 
   /// Reflected light of the vertices, turned to their normals.

@@ -43,8 +43,9 @@ struct Radiosity {
   int neighbours = 10;     // of the flattened points around a vertex
   bool vector = true;      // reflected light is turned to the normal where it is read; else it is read as it is
   std::uint64_t seed = 0;
-  std::vector<Vec3f> known_direct = {};  // direct light of each vertex; empty: it is found
-  std::vector<StandIn> stand_ins = {};   // where hidden vertices are lit instead; ascending (core/prt/hidden.h)
+  std::vector<Vec3f> known_direct = {};    // direct light of each vertex; empty: it is found
+  std::vector<StandIn> stand_ins = {};     // where hidden vertices are lit instead; ascending (core/prt/hidden.h)
+  std::vector<std::uint32_t> probes = {};  // vertices that gather twice besides, for GatherProbe; change nothing else
   std::function<void(std::string_view stage)> stage = {};  // told as each begins: points, direct, gather, basis, sweeps
 };
 
@@ -56,12 +57,20 @@ struct RadiosityStats {
   std::vector<std::uint32_t> points, gathered;  // on each level
   std::size_t alone = 0;                        // vertices with rows of their own
   int sweeps = 0;
+  double tail = 0;  // share of the light in reflections beyond the last, where their number is given and not 0
+};
+
+/// Reflected light of a vertex as it was read, and as two independent gathers at the vertex itself have it.
+struct GatherProbe {
+  Vec3f read, first, second;
+  float spread = 1;  // the variance of `read`, of that of one gather: the sum of its squared weights
 };
 
 struct RadiosityResult {
   std::vector<Vec3f> direct, indirect;  // of each vertex of the tracer's mesh
   std::unique_ptr<LitSurface> surface;  // with the light that one more reflection gathers: all of it, or that of
                                         // bounces - 1 reflections where their number is given; null where that is 0
+  std::vector<GatherProbe> probes;      // of params.probes; none where nothing is reflected
   RadiosityStats stats;
 };
 

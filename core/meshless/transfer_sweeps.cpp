@@ -99,8 +99,7 @@ class Solver {
     const std::vector<float> sky = bake_direct_transfer(tracer_, at_, params_.sky, threads_, &stats);
     std::vector<Vec3f> lamps(at_.size());
     if (out_.transfer.fixed) {
-      lamps =
-          bake_fixed_direct(tracer_, at_, {.samples = params_.lamp_samples, .seed = params_.seed}, threads_, &stats);
+      lamps = bake_fixed_direct(tracer_, at_, params_.lamps, threads_, &stats);
       std::vector<Vec3f> all = lamps;
       all.insert(all.end(), fixed_.begin(), fixed_.end());
       out_.transfer.channels = transfer_channels(surface_->faces(), tracer_.scene(), all);

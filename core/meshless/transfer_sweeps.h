@@ -32,7 +32,7 @@ struct TransferSweeps {
   int bounces = 1;  // reflections, at least 1
   PointPlacement points = {};
   DirectTransfer sky = {};  // of the points; its order is that of all, band_power is set
-  int lamp_samples = 64;    // of the points
+  FixedDirect lamps = {};   // of the points
   int rays = 256;           // of a gather
   int uniform_levels = 3;   // gathered at everywhere
   float eps = 0.02F;        // of the mean light

@@ -59,45 +59,46 @@ Vec3f Lamps::emitted(const Receiver& at, const EmitterRays& wanted, std::uint64_
   double change = 0;  // squared, of the mean; the last round's, or a half of the one before
   int done = 0;
   for (int end = wanted.reach > 1 ? wanted.samples / 4 : most; done < most; end = std::min(2 * end, most)) {
-    sum += from_points(at, {done, end, cosine}, mix64(seed)) +
+    sum += from_points(at, {done, end, cosine}, mix64(seed), rays) +
            from_rays(at, {cosine_share(done), cosine_share(end), cosine}, mix64(seed + 1));
+    rays += static_cast<std::uint64_t>(cosine_share(end) - cosine_share(done));
     const Vec3d step = sum / end - std::exchange(mean, sum / end);
     change = done == 0 ? 0 : std::max(dot(step, step), change / 4);
     done = end;
     if (done >= wanted.samples && kLeft * change / 3 <= wanted.tolerance * wanted.tolerance) break;
   }
-  rays += static_cast<std::uint64_t>(done + cosine_share(done));
   return to_float(mean);
 }
 
-Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t seed) const {
+Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t seed, std::uint64_t& sent) const {
   const Vec3d origin = to_double(at.origin), normal = to_double(at.normal);
   Vec3d sum;
-  for (int first = round.first; first < round.last; first += kPacket) {
-    const int count = std::min(kPacket, round.last - first);
-    Rays16 rays;
-    set_origin(rays, at.origin);
-    std::array<Vec3d, kPacket> light{};
-    for (int i = 0; i < count; ++i) {
-      // One stratified pair: the first number picks the triangle, what is left of it and the second a point there.
-      const auto index = static_cast<std::uint32_t>(first + i);
-      const Vec2f u = sobol_owen(index, seed), v = sobol_owen(index, ~seed);
-      const EmitterSample s = emitters_.sample(u.x, {v.x, v.y});
-      const Vec3d way = s.position - origin;
-      const double distance = length(way);
-      const Vec3d w = normalized(way);
-      set_lane(rays, static_cast<std::size_t>(i), w, distance * kShortfall);
-      const double cosine = dot(w, normal), facing = s.double_sided ? std::abs(dot(w, s.normal)) : -dot(w, s.normal);
-      if (cosine <= 0 || facing <= 0) continue;
-      const double solid_density = s.density * distance * distance / facing;
-      const double weight = cosine * kInversePi / (solid_density + round.cosine * cosine * kInversePi);
-      light[static_cast<std::size_t>(i)] = s.radiance * weight;
+  Rays16 rays;
+  set_origin(rays, at.origin);
+  std::array<Vec3d, kPacket> light;
+  std::size_t lanes = 0;  // samples that may bring light and wait for a full packet
+  const auto send = [&] {
+    const std::uint32_t hidden = tracer_.occluded16(rays, static_cast<int>(lanes));
+    for (std::size_t i = 0; i < lanes; ++i) {
+      if ((hidden >> i & 1U) == 0) sum += light[i];
     }
-    const std::uint32_t hidden = tracer_.occluded16(rays, count);
-    for (int i = 0; i < count; ++i) {
-      if ((hidden >> i & 1U) == 0) sum += light[static_cast<std::size_t>(i)];
-    }
+    sent += std::exchange(lanes, 0);
+  };
+  for (auto index = static_cast<std::uint32_t>(round.first); index < static_cast<std::uint32_t>(round.last); ++index) {
+    // One stratified pair: the first number picks the triangle, what is left of it and the second a point there.
+    const Vec2f u = sobol_owen(index, seed), v = sobol_owen(index, ~seed);
+    const EmitterSample s = emitters_.sample(u.x, {v.x, v.y});
+    const Vec3d way = s.position - origin;
+    const double distance = length(way);
+    const Vec3d w = normalized(way);
+    const double cosine = dot(w, normal), facing = s.double_sided ? std::abs(dot(w, s.normal)) : -dot(w, s.normal);
+    if (cosine <= 0 || facing <= 0 || s.radiance == Vec3d{}) continue;
+    const double solid_density = s.density * distance * distance / facing;
+    light[lanes] = s.radiance * (cosine * kInversePi / (solid_density + round.cosine * cosine * kInversePi));
+    set_lane(rays, lanes++, w, distance * kShortfall);
+    if (lanes == kPacket) send();
   }
+  if (lanes > 0) send();
   return sum;
 }
 

@@ -43,7 +43,8 @@ class Lamps {
   /// Irradiance / pi from the punctual lights, or one of them: one shadow ray each.
   Vec3f punctual(const Receiver&) const;
   Vec3f punctual(const Receiver&, const Light&) const;
-  /// Irradiance / pi from the emitters: points on them and cosine_share of as many rays. Adds them to `rays`.
+  /// Irradiance / pi from the emitters: points on them and cosine_share of as many rays. Adds what was sent to
+  /// `rays`: a point that cannot bring light costs none.
   Vec3f emitted(const Receiver&, const EmitterRays&, std::uint64_t seed, std::uint64_t& rays) const;
   /// Radiance that leaves an emitter against a ray that hits it.
   Vec3f emission(std::uint32_t triangle, float u, float v, const Vec3f& direction) const;
@@ -53,7 +54,7 @@ class Lamps {
     int first, last;  // samples, of one kind
     double cosine;    // rays for each point on an emitter
   };
-  Vec3d from_points(const Receiver&, const Round&, std::uint64_t seed) const;
+  Vec3d from_points(const Receiver&, const Round&, std::uint64_t seed, std::uint64_t& sent) const;
   Vec3d from_rays(const Receiver&, const Round&, std::uint64_t seed) const;
 
   const Tracer& tracer_;

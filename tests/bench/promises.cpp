@@ -1,11 +1,12 @@
 // Are promised errors kept? Bakes scenes to a list of targets and measures each result again at 8192 other points.
-//   kiln_promises [--step prt|lightfield] [--targets .1,.05,.02] [SCENE.glb ...]     the two demo scenes when none is
-//   named
+//   kiln_promises [--step prt|radiosity|transport|lightfield] [--targets .1,.05,.02] [SCENE.glb ...]
+// The two demo scenes when none is named.
 // One JSON line a bake: target, how it ended, certified interval, independent error, seconds, passes. Asserts nothing.
 // Scenes are lit by their own lamps and by the built-in clear sky (order 6, so that the target bounds transport), light
 // fields by the courtyard.
 
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,11 +14,13 @@
 
 #include "client_cli/models.h"
 #include "core/artifact/baked_scene.h"
+#include "core/artifact/links_glb.h"
 #include "core/bake/bake.h"
 #include "core/bake/certificate.h"
 #include "core/bake/demo_scene.h"
 #include "core/bake/job_light.h"
 #include "core/bake/light_field_certificate.h"
+#include "core/bake/links_certificate.h"
 #include "tests/core/bake/output_file.h"
 
 namespace kiln {
@@ -44,22 +47,35 @@ using testing::file;
 
 constexpr std::uint64_t kManyRays = 4'000'000'000, kOtherSeed = 4711;
 
-/// Transport, or radiance towards eyes, at points of its own.
-ErrorStats judge_again(const BakeInput& input, const BakedScene& decoded, Threads& threads) {
+/// Transport, radiance towards eyes, or reflected light of lamps, at points of its own.
+ErrorStats judge_again(const BakeInput& input, const Bytes& glb, const BakedScene& decoded, Threads& threads) {
   const auto scene = import_scene(input.scene, {});
   const Tracer truth(*scene, threads);
   const auto light = *job_light(input);
+  if (input.recipe.transport) {
+    const auto links = read_links(glb, decoded);
+    const LinksCheck check{.decoded = decoded,
+                           .links = *links,
+                           .builder = nullptr,
+                           .truth = truth,
+                           .bake_rays = kManyRays / 4,
+                           .seed = kOtherSeed};
+    return certify_links(check, threads).of_rms;
+  }
   if (!input.recipe.light_field)
     return certify(decoded, truth, light, {.bake_rays = kManyRays, .seed = kOtherSeed}, threads).transport;
   return certify_field({decoded, truth, light, kManyRays, kOtherSeed}, threads).radiance;
 }
 
-void measure(const Named& scene, bool field, double target, Threads& threads) {
-  const json prt = {{"do", "prt"}, {"order", 6}}, eyes = {{"do", "lightfield"}};
+void measure(const Named& scene, const std::string& step, double target, Threads& threads) {
+  const bool field = step == "lightfield";
+  json steps = json::array({{{"do", step}}});
+  if (step == "prt") steps[0]["order"] = 6;
   const json recipe = {{"environment", {{"builtin", field ? "courtyard" : "clear"}}},
                        {"quality", {{"target_error", target}}},
-                       {"steps", json::array({field ? eyes : prt})}};
+                       {"steps", steps}};
   BakeInput input{scene.files, *parse_recipe(recipe.dump()), {}, {}};
+  const std::clock_t start = std::clock();
   const auto output = bake(input, {}, threads);
   if (!output) {
     std::printf("%s\n", json{{"scene", scene.name}, {"target", target}, {"fault", output.error().code}}.dump().c_str());
@@ -67,17 +83,21 @@ void measure(const Named& scene, bool field, double target, Threads& threads) {
   }
   const json report = json::parse(file(*output, "report.json"));
   const auto decoded = read_baked_glb(file(*output, "scene.glb"));
-  const ErrorStats other = judge_again(input, *decoded, threads);
-  const json& certificate = field ? report["lightfield"]["certificate"] : report["certificate"];
+  const ErrorStats other = judge_again(input, file(*output, "scene.glb"), *decoded, threads);
+  const bool links = step == "transport";
+  const json& certificate = (field ? report["lightfield"] : links ? report["links"] : report)["certificate"];
   std::printf("%s\n", json{{"scene", scene.name},
                            {"target", target},
                            {"ended_by", report["promise"]["ended_by"]},
-                           {"certified", certificate["relrmse"]},
-                           {"interval", certificate["interval"]},
+                           {"certified", certificate[links ? "of_rms" : "relrmse"]},
+                           {"interval", certificate[links ? "of_rms_interval" : "interval"]},
                            {"independent", other.relrmse},
                            {"independent_interval", {other.interval_low, other.interval_high}},
                            {"seconds", report["seconds"]},
+                           {"processor_seconds", static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC},
                            {"passes", report["promise"]["passes"].size()},
+                           {"pass_list", report["promise"]["passes"]},
+                           {"reason", report["promise"]["reason"]},
                            {"triangles", report["result"]["triangles"]},
                            {"bytes", report["result"]["bytes"]}}
                           .dump()
@@ -88,7 +108,7 @@ void measure(const Named& scene, bool field, double target, Threads& threads) {
 int run(int count, char** words) {
   std::vector<double> targets = {0.1, 0.05, 0.02};
   std::vector<Named> scenes;
-  bool field = false;
+  std::string step = "prt";
   for (int i = 1; i < count; ++i) {
     const std::string word = words[i];
     if (word == "--targets" && i + 1 < count) {
@@ -96,7 +116,7 @@ int run(int count, char** words) {
       continue;
     }
     if (word == "--step" && i + 1 < count) {
-      field = std::string(words[++i]) == "lightfield";
+      step = words[++i];
       continue;
     }
     auto files = load_files(word);
@@ -113,7 +133,7 @@ int run(int count, char** words) {
   }
   Threads threads;
   for (const Named& scene : scenes) {
-    for (const double target : targets) measure(scene, field, target, threads);
+    for (const double target : targets) measure(scene, step, target, threads);
   }
   return 0;
 }

@@ -54,6 +54,19 @@ TEST(ErrorStats, NoLightingDominates) {
   EXPECT_NEAR(stats.relrmse, 0.1 * std::sqrt(2.0 / 3), 1e-12);
 }
 
+TEST(ErrorStats, OfRmsIsRelativeToTheLightWhereItIs) {
+  // Light at one point of a hundred, a tenth too bright there: a tenth of its root mean square, and of its mean ten
+  // times that. What is scaled by three has the same error.
+  std::vector<Vec3d> reference(200), values(200);
+  reference[7] = {1, 1, 1}, values[7] = {1.1, 1.1, 1.1};
+  reference[107] = {3, 3, 3}, values[107] = {3.3, 3.3, 3.3};
+  EXPECT_NEAR(compute_error({values, reference, {}, 100}).relrmse, 1.0, 1e-12);
+  const ErrorStats of_rms = compute_error({values, reference, {}, 100, {}, true});
+  EXPECT_NEAR(of_rms.relrmse, 0.1, 1e-12);
+  EXPECT_NEAR(of_rms.by_lighting[1], 0.1, 1e-12);
+  EXPECT_NEAR(of_rms.bias, 0.01, 1e-12);
+}
+
 TEST(ErrorStats, TheNoiseOfTheReferenceIsSubtracted) {
   // x = 1 + 0.03 g, ref = 1 + 0.1 g'; g, g' normal. The truth is 0.03, though |x - ref| shows 0.104.
   std::vector<Vec3d> values, half_a, half_b, reference;

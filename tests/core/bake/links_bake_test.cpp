@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/links_glb.h"
+#include "core/bake/links_certificate.h"
+#include "core/bake/progressive.h"
 #include "tests/core/bake/bake_input.h"
 
 namespace kiln {
@@ -32,6 +35,13 @@ TEST(LinksBake, OfARoomHoldsItsCertificate) {
   EXPECT_LT(certificate["relrmse"].get<double>(), 0.2);
   EXPECT_LT(std::abs(certificate["bias"].get<double>()), 0.05);
   EXPECT_LT(links["share_of_possible"].get<double>(), 0.02);
+  double sum = 0;  // sources are squares that sum to the square of of_rms
+  for (const auto& [name, part] : certificate["sources"].items()) {
+    EXPECT_GE(part.get<double>(), 0) << name;
+    sum += part.get<double>() * part.get<double>();
+  }
+  EXPECT_NEAR(std::sqrt(sum), certificate["of_rms"].get<double>(), 1e-9);
+  EXPECT_GT(certificate["sources"]["noise"].get<double>(), 0);
 }
 
 TEST(LinksBake, DeliversLinksForTheVerticesOfTheFile) {
@@ -85,10 +95,57 @@ TEST(LinksBake, OfRadiiOfNoUseIsRefusedWithNumbersOrHasFewPoints) {
   EXPECT_LT(report_of(*huge)["links"]["senders"].get<int>(), 100);
 }
 
-TEST(LinksBake, CannotBePromisedYet) {
-  const auto recipe = parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"transport"}]})");
-  ASSERT_FALSE(recipe);
-  EXPECT_EQ(recipe.error()[0].pointer, "/quality");
+TEST(LinksPromise, ATargetIsMetByTheSameBytesOnAnyThreadsAndAfterAnInterruptionAndHoldsForOtherLamps) {
+  Threads one(1), two(2);
+  const BakeInput input = input_of("column", R"({"steps":[{"do":"transport"}],"quality":{"target_error":0.13}})");
+  std::vector<std::string> saved;
+  const auto output = bake(input, {}, one, {{}, [&](const std::string& text) { saved.push_back(text); }});
+  ASSERT_TRUE(output) << output.error().message;
+  const nlohmann::json report = report_of(*output), &promise = report["promise"];
+  EXPECT_EQ(promise["ended_by"], "target_met") << promise;
+  EXPECT_LE(report["links"]["certificate"]["of_rms_interval"][1].get<double>(), 0.13);
+  ASSERT_GE(saved.size(), 2U);
+  const auto resumed = bake(input, {}, two, {saved.front(), {}});
+  ASSERT_TRUE(resumed);
+  EXPECT_EQ(file(*output, "scene.glb"), file(*resumed, "scene.glb"));
+  EXPECT_EQ(report_of(*resumed)["promise"]["passes"].size(), saved.size());
+
+  const auto scene = import_scene(input.scene, {});
+  const auto decoded = read_baked_glb(file(*output, "scene.glb"));
+  const auto links = read_links(file(*output, "scene.glb"), *decoded);
+  ASSERT_TRUE(links);
+  const Tracer truth(*scene, two);
+  const LinksCheck check{.decoded = *decoded, .links = *links, .builder = nullptr, .truth = truth, .seed = 99};
+  EXPECT_LE(certify_links(check, two).of_rms.interval_low, 0.13);
+}
+
+TEST(LinksPromise, TheNextPassSpendsOnTheLargestSource) {
+  const auto next_after = [](const ErrorSources& sources) {
+    PassRecord pass{.samples = 128, .bounce_samples = 256, .triangles = 10'000};
+    pass.points = 3000, pass.rays = 4'000'000, pass.bounce_rays = 1'000'000, pass.seconds = 1;
+    pass.sources = sources;
+    pass.relrmse = std::hypot(sources.noise, sources.interpolation, sources.points);
+    pass.low = 0.9 * pass.relrmse, pass.high = 1.1 * pass.relrmse;
+    Passes passes({.target_error = 0.05}, {.order = true, .direct = true}, {}, links_passes());
+    passes.add(pass);
+    Plan plan;
+    plan.radiosity.emplace();
+    plan.radiosity->points.radius = 0.1F, plan.radiosity->points.levels = 5;
+    LinkParams& l = plan.links.emplace();
+    l.rays = 256, l.most_senders = 3000, l.points = plan.radiosity->points;
+    plan.subdivide.triangles = 10'000;
+    return *passes.next(plan, Scene{});
+  };
+  const Plan noisy = next_after({.noise = 0.1, .noise_of_reflections = 0.1, .interpolation = 0.01});
+  EXPECT_GT(noisy.links->rays, 512);
+  EXPECT_EQ(noisy.links->most_senders, 3000U);
+  const Plan coarse = next_after({.noise = 0.005, .noise_of_reflections = 0.005, .points = 0.06});
+  EXPECT_EQ(coarse.links->rays, 256);
+  EXPECT_GT(coarse.links->most_senders, 4500U);
+  EXPECT_LT(coarse.links->points.radius, 0.085F);
+  const Plan flat = next_after({.noise = 0.01, .noise_of_reflections = 0.01, .interpolation = 0.1});
+  EXPECT_GT(flat.subdivide.triangles, 20'000U);
+  EXPECT_EQ(flat.links->most_senders, 3000U);
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ PassRecord pass_with(const ErrorSources& sources) {
 }
 
 Plan next_after(const PassRecord& pass) {
-  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  Passes passes({.target_error = 0.02}, {.order = true}, {});
   passes.add(pass);
   Plan plan;
   plan.samples = pass.samples;
@@ -188,7 +188,7 @@ TEST(Promise, PassesTowardsATargetDoNotDependOnTime) {
 }
 
 TEST(Promise, APassThatMeetsTheTargetIsTheLast) {
-  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  Passes passes({.target_error = 0.02}, {.order = true}, {});
   passes.add(pass_with({.noise = 0.01, .interpolation = 0.01}));
   EXPECT_FALSE(passes.next({}, Scene{}));
   EXPECT_EQ(passes.outlook().ending, Outlook::Ending::target_met);
@@ -200,7 +200,7 @@ TEST(Promise, ABudgetBuysWhatTheLastPassCostForItsRaysAndTriangles) {
   // 5.5 million for one second. Three seconds are left, nine tenths of them to be spent, on direct noise alone: (2.7 -
   // 1) 5.5 / .5 + 1 = 19.7 times the rays, and no pass takes more than eight times. Of 1.5 seconds 4.85 times.
   for (const auto& [left, samples] : {std::pair{3.0, 512}, {1.5, 310}}) {
-    Passes passes({.time_budget_s = 10}, {.order = 6, .subdivide = {.mode = PrtStep::Subdivision::Mode::off}}, {});
+    Passes passes({.time_budget_s = 10}, {.order = true, .triangles = true}, {});
     PassRecord pass = pass_with({.noise = 0.05});
     pass.elapsed_s = 10 - 0.4 - left;  // .4: reserved for preview and report
     passes.add(pass);
@@ -214,7 +214,7 @@ TEST(Promise, ABudgetBuysWhatTheLastPassCostForItsRaysAndTriangles) {
 }
 
 TEST(Promise, TheWallLimitEndsATargetBeforeTheJobIsKilled) {
-  Passes passes({.target_error = 0.02}, {.order = 6}, {.wall_s = 10});
+  Passes passes({.target_error = 0.02}, {.order = true}, {.wall_s = 10});
   PassRecord pass = pass_with({.noise = 0.05, .interpolation = 0.05});
   pass.elapsed_s = 8;
   passes.add(pass);
@@ -250,6 +250,8 @@ TEST(Promise, RecordsComeBackFromACheckpointBitForBit) {
   pass.own_high = 1e-300;
   pass.sources.truncation = 0.1 + 0.2;
   pass.elapsed_s = 2.0 / 3;
+  pass.points = 1ULL << 40, pass.gathered = 3;
+  pass.sources.points = 0.7;
   const auto back = parse_checkpoint(checkpoint_json(std::vector{pass, pass}));
   ASSERT_EQ(back.size(), 2U);
   EXPECT_EQ(back[1].own_high, pass.own_high);
@@ -260,10 +262,13 @@ TEST(Promise, RecordsComeBackFromACheckpointBitForBit) {
   EXPECT_EQ(back[1].triangles, pass.triangles);
   EXPECT_EQ(back[1].bounce_rays, pass.bounce_rays);
   EXPECT_EQ(back[1].bounce_samples, pass.bounce_samples);
+  EXPECT_EQ(back[1].points, pass.points);
+  EXPECT_EQ(back[1].gathered, pass.gathered);
+  EXPECT_EQ(back[1].sources.points, pass.sources.points);
 }
 
 TEST(Promise, TwoDearPassesThatDoNotHelpAreAFloor) {
-  Passes passes({.target_error = 0.02}, {.order = 6}, {});
+  Passes passes({.target_error = 0.02}, {.order = true}, {});
   for (int i = 0; i < 3; ++i) {
     PassRecord pass = pass_with({.noise = 0.03, .interpolation = 0.03});
     pass.rays = 1'000'000ULL << (2 * i);

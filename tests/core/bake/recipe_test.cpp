@@ -118,8 +118,10 @@ TEST(Recipe, APromiseOfALightFieldNeedsSomethingToSpend) {
             std::vector<std::string>{"/steps/1/simplify/max_error"});
 }
 
-TEST(Recipe, PromisesNothingOfRadiosity) {
-  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity"}]})"),
+TEST(Recipe, APromiseOfRadiosityNeedsSomethingToSpend) {
+  EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"radiosity","rays":64}]})"));
+  EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},
+                         "steps":[{"do":"radiosity","rays":64,"points":{"radius":0.1},"subdivide":"off"}]})"),
             (std::vector<std::string>{"/quality"}));
 }
 

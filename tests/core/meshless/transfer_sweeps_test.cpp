@@ -23,7 +23,7 @@ TransferSweeps params_of(int order, int bounces, int rays = 256) {
           .sky = {.order = order,
                   .samples = 256,
                   .band_power = std::vector<float>(static_cast<std::size_t>(order), 4 * std::numbers::pi_v<float>)},
-          .lamp_samples = 64,
+          .lamps = {.samples = 64},
           .rays = rays};
 }
 

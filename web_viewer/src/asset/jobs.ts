@@ -202,6 +202,9 @@ export interface Report {
     certificate: {
       relrmse: number;
       interval?: [number, number];
+      of_rms?: number;
+      of_rms_interval?: [number, number];
+      sources?: Record<string, number>; // squares that sum to that of of_rms
       lamps: { place: [number, number, number]; relrmse: number; mean_light: number }[];
     } | null;
   };

@@ -64,6 +64,7 @@ const withInterval = (c: { relrmse: number; interval?: [number, number] }): stri
 const kSources: readonly (readonly [string, string])[] = [
   ['noise', 'Error from noise'],
   ['noise_of_reflections', 'of reflected light'],
+  ['points', 'from points around vertices'],
   ['interpolation', 'from interpolation'],
   ['bounce_tail', 'from bounces left out'],
   ['quantisation', 'from quantisation'],
@@ -140,8 +141,22 @@ function links({ senders, receivers, links: kept, share_of_possible: share, byte
     ['Links', `${count(kept)}, ${percent(share)} of possible`],
     ['In the file', bytes(file)],
     ...(c ? [['Relative error of reflected light', withInterval(c)] as const] : []),
+    ...(c?.of_rms === undefined
+      ? []
+      : [['relative to its root mean square', percent(c.of_rms) + interval(c.of_rms_interval)] as const]),
+    ...linkSources(c?.sources),
   ];
 }
+
+const kLinkSources: readonly (readonly [string, string])[] = [
+  ['noise', 'from noise'],
+  ['links', 'from groups of senders'],
+  ['senders', 'from cells of senders'],
+  ['interpolation', 'from interpolation'],
+];
+
+const linkSources = (from: Record<string, number> | undefined): Row[] =>
+  kLinkSources.flatMap(([key, label]): Row[] => (from?.[key] === undefined ? [] : [[label, percent(from[key])]]));
 
 /// The certificate of matrices, with eyes all around.
 function specular({ radiance, transport, truncation }: NonNullable<Report['glossy']>): Row[] {
