@@ -58,15 +58,16 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + (1U 
 Result<void> check_memory(const Plan& plan, const Limits& limits) {
   const bool carried = plan.field && plan.field->carried;
   if (plan.prediction.memory_bytes <= limits.memory_mb << 20) return {};
-  return fault("memory_limit",
-               "the bake would need about " + megabytes(plan.prediction.memory_bytes) +
-                   " and limits.memory_mb allows " + std::to_string(limits.memory_mb) + " MB; " +
-                   (carried          ? "give the file fewer vertices"
-                    : plan.grid      ? "lower /steps/0/resolution"
-                    : plan.lightmap  ? "lower /steps/0/lightmap/size or rays, or raise points/radius"
-                    : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
-                                     : "lower /steps/0/subdivide/triangles or /steps/0/order") +
-                   ", or raise the limit");
+  return fault(
+      "memory_limit",
+      "the bake would need about " + megabytes(plan.prediction.memory_bytes) + " and limits.memory_mb allows " +
+          std::to_string(limits.memory_mb) + " MB; " +
+          (carried          ? "give the file fewer vertices"
+           : plan.grid      ? "lower /steps/0/resolution"
+           : plan.meshless  ? "raise /steps/0/points/radius, lower /steps/0/subdivide/triangles or /steps/0/order"
+           : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
+                            : "lower /steps/0/subdivide/triangles or /steps/0/order") +
+          ", or raise the limit");
 }
 
 /// The baked scene before it is written: transport, the job's light, and an exposure that suits both.
@@ -145,6 +146,7 @@ struct Pass {
   std::optional<PointsOutcome> point_field;
   std::optional<FieldOutcome> field;
   std::optional<GlossyReport> glossy;
+  std::optional<MeshlessOutcome> meshless;
 };
 
 /// What the steps that light the scene as `radiosity` does make besides.
@@ -262,6 +264,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   const NoiseProbes noise = std::move(transport.noise);
   pass.bounce_rays = transport.bounce_rays;
   pass.merge = transport.merge;
+  pass.meshless = transport.meshless;
   BakedScene baked = assemble(std::move(scene), std::move(transport), std::move(own), provenance(input));
   if (lightmap && !input.recipe.radiosity->deliver.vertices) baked.exposure = lightmap->exposure();
   std::optional<LightFieldStage> stage;
@@ -462,6 +465,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
                                           .points = pass.point_field,
                                           .field = pass.field,
                                           .glossy = pass.glossy,
+                                          .meshless = pass.meshless,
                                           .passes = passes});
   BakeOutput output;
   output.files.push_back({"scene.glb", "model/gltf-binary", std::move(pass.glb)});

@@ -101,22 +101,64 @@ double stored_bytes_of_vertex(const Plan& plan, double slots) {
   return 0.62 * slots + lamps;
 }
 
+/// A count of what may be beyond counting.
+std::uint64_t whole(double x) { return static_cast<std::uint64_t>(std::min(x, 1e18)); }
+
+// Of what points hold, read at a vertex with what it sees of them, in seconds; placing a point and asking around it.
+constexpr double kReadPrice = 3e-5, kPointPrice = 1e-4;
+// Of the points, those that gather: .8 to .95 on scans, .4 where walls are flat.
+constexpr double kGathered = 0.8;
+
+double points_of(const PointPlacement& placement, const Scene& scene) {
+  return expected_points(placed_area(placement, scene), std::ldexp(double{placement.radius}, 1 - placement.levels));
+}
+
+/// Matrices that so many vertices read.
+double matrices_on_points(const Plan& plan, const Scene& scene, double vertices) {
+  return kGathered * points_of(matrix_points(*plan.meshless, scene, plan.glossy.parts, vertices), scene);
+}
+
+/// Of reflected light: at the vertices, or on points.
+struct ReflectionCosts {
+  double rays = 0, seconds = 0, memory = 0;
+};
+
+ReflectionCosts reflection_costs(const Plan& plan, const Scene& scene, const Sizes& sizes, double price) {
+  if (plan.bounces == 0) return {};
+  if (!plan.meshless) {
+    const Interreflection passes{.bounces = plan.bounces, .samples = plan.bounce_samples};
+    const double rays = sizes.vertices * (plan.split ? kSplitShare : 1) * static_cast<double>(rays_per_vertex(passes));
+    return {.rays = rays, .seconds = rays * kReflectedPrice * price};
+  }
+  const double points = points_of(sweep_points(*plan.meshless, scene, sizes.vertices), scene);
+  const double numbers = 3 * (sh_count(plan.order) + (plan.lamps ? 1 : 0));
+  const double direct = points * plan.costs.sky_rays * rough_share(plan, plan.costs.sky_rays);
+  const double gathered = kGathered * points * plan.bounce_samples;
+  const double swept = 4e-11 * gathered * numbers * (plan.bounces + 4);  // the last one with its turning
+  return {.rays = direct + gathered,
+          .seconds = direct * price + gathered * kReflectedPrice * price + swept + kPointPrice * points +
+                     kReadPrice * sizes.vertices,
+          .memory = 12 * gathered + points * (300 + 4 * numbers * 6)};
+}
+
 /// Of the matrices, as if vertices were added everywhere alike. The column scene with a metal knot: 6.6 s foretold, 7.1
 /// measured; with a metal floor, which gets most of the new vertices, 3.5 and 9.0.
 struct MatrixCosts {
   double rays = 0, seconds = 0, memory = 0, bytes = 0;
 };
 
-MatrixCosts matrix_costs(const Plan& plan, double vertices, double price) {
+MatrixCosts matrix_costs(const Plan& plan, const Scene& scene, double vertices, double price) {
   if (!plan.glossy) return {};
   constexpr double kComponents = 128, kSamples = 2 * kGlossySamples, kProduct = 1.5e-4;
   const double count = vertices * plan.glossy.vertex_share, outputs = sh_count(plan.glossy.order);
   const double numbers = 3 * outputs * (outputs + (plan.lamps ? 1 : 0));
-  const double rays = (count + kSamples) * plan.glossy.samples;
-  return {.rays = rays,
-          .seconds = rays * kReflectedPrice * price + count * kProduct + 0.4,
-          .memory = 8 * count * kComponents + 2.5 * 8 * numbers * kGlossySamples,
-          .bytes = 95 * count + 4 * (kComponents + 1) * numbers + 5e4};
+  const double computed = plan.meshless ? matrices_on_points(plan, scene, count) : count;
+  const double rays = (computed + kSamples) * plan.glossy.samples;
+  return {
+      .rays = rays,
+      .seconds = rays * kReflectedPrice * price + computed * kProduct + 0.4 + (plan.meshless ? kReadPrice * count : 0),
+      .memory = 8 * count * kComponents + 2.5 * 8 * numbers * kGlossySamples,
+      .bytes = 95 * count + 4 * (kComponents + 1) * numbers + 5e4};
 }
 
 /// Of merging, which looks at the input twice by few rays (merge_step.h). Simplification took 40 to 60 us a vertex.
@@ -177,19 +219,15 @@ Prediction predict(const Plan& plan, const Scene& scene) {
   const double more = static_cast<double>(plan.samples) / costs.samples;  // a later pass than the one that was measured
   const double sky = asked.exact + asked.rough * rough_share(plan, costs.sky_rays * more);
   const double lamp = asked.exact + asked.rough / kRoughRays;
-  const double reflected =
-      sizes.vertices * (plan.split ? kSplitShare : 1) *
-      static_cast<double>(rays_per_vertex(Interreflection{.bounces = plan.bounces, .samples = plan.bounce_samples}));
-
   const double sky_rays = sky * costs.sky_rays * more, lamp_rays = lamp * costs.lamp_rays * more;
   const double price = costs.sky_rays > 0 ? costs.sky_seconds / costs.sky_rays : 0;
-  const double traced =
-      (sky * costs.sky_seconds + lamp * costs.lamp_seconds) * more + reflected * kReflectedPrice * price;
+  const ReflectionCosts reflected = reflection_costs(plan, scene, sizes, price);
+  const double traced = (sky * costs.sky_seconds + lamp * costs.lamp_seconds) * more + reflected.seconds;
   const double splitting = plan.split ? 1.4e-5 * sizes.triangles : 0;
   const double writing = sizes.vertices * (5e-6 + 4.5e-7 * slots);
   const double certificate = 0.12 + 0.04 * traced;
 
-  const MatrixCosts matrices = matrix_costs(plan, sizes.vertices, price);
+  const MatrixCosts matrices = matrix_costs(plan, scene, sizes.vertices, price);
   const MergeCosts merging = merge_costs(plan, static_cast<double>(scene.mesh.position.size()), slots, more);
   double pixels = 0, files = 0;
   for (const Image& image : scene.images) {
@@ -200,10 +238,10 @@ Prediction predict(const Plan& plan, const Scene& scene) {
   Prediction out;
   out.triangles = static_cast<std::uint64_t>(sizes.triangles);
   out.vertices = static_cast<std::uint64_t>(sizes.vertices);
-  out.rays = static_cast<std::uint64_t>(sky_rays + lamp_rays + reflected + matrices.rays + merging.rays);
+  out.rays = whole(sky_rays + lamp_rays + reflected.rays + matrices.rays + merging.rays);
   out.seconds = 0.05 + traced + splitting + writing + certificate + matrices.seconds + merging.seconds;
-  const double baking = sizes.vertices * (620 + 40 * slots) + matrices.memory;
-  out.memory_bytes = static_cast<std::uint64_t>(24e6 + std::max(baking, merging.memory) + 2 * pixels + 2 * files);
+  const double baking = sizes.vertices * (620 + 40 * slots) + matrices.memory + reflected.memory;
+  out.memory_bytes = whole(24e6 + std::max(baking, merging.memory) + 2 * pixels + 2 * files);
   out.artifact_bytes = static_cast<std::uint64_t>(
       2000 + 2500 * static_cast<double>(scene.parts.size()) + files + 4.5 * (sizes.vertices + input_vertices) +
       sizes.vertices * stored_bytes_of_vertex(plan, slots) + matrices.bytes);

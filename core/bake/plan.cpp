@@ -182,6 +182,7 @@ Plan make_plan(const Scene& scene, const PrtStep& step, const Effort& effort, Th
   plan_subdivision(plan, scene, step.subdivide, effort);
   plan_encoding(plan, step, effort);
   plan_matrices(plan, scene, step);
+  plan_meshless(plan, scene, step, effort);
   plan.costs = measure_costs(tracer, plan, threads);
   plan.prediction = predict(plan, scene);
   return plan;

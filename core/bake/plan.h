@@ -9,6 +9,7 @@
 #include "core/bake/forecast.h"
 #include "core/bake/glossy_plan.h"
 #include "core/bake/merge_plan.h"
+#include "core/bake/meshless_plan.h"
 #include "core/bake/recipe.h"
 #include "core/base/threads.h"
 #include "core/grid/bake_grid.h"
@@ -66,6 +67,7 @@ struct Plan {
   int raw_bits = 12;           // of coefficients, where the encoding leaves them open
   double compression = 0.005;  // relRMSE that components may add
   GlossyPlan glossy;
+  std::optional<MeshlessPlan> meshless;    // solver of the step `prt`
   std::optional<Radiosity> radiosity;      // of the step `radiosity`; order is 0 then
   std::uint64_t triangles_of_quality = 0;  // added where light changes, by `radiosity` where the recipe does not say
   std::optional<LightmapPlan> lightmap;    // of the step `radiosity`

@@ -114,6 +114,25 @@ PrtStep::Encoding read_encoding(const json& value, const std::string& pointer, E
   return out;
 }
 
+/// Of solver: meshless; with vertices its fields mean nothing.
+std::optional<PrtStep::Meshless> read_meshless(JsonFields& fields, const std::string& pointer, Errors& errors) {
+  const bool meshless = fields.word("solver", {"vertices", "meshless"}) == 1;
+  PrtStep::Meshless out;
+  const json* points = fields.find("points");
+  if (points != nullptr) {
+    JsonFields inner(*points, pointer + "/points", errors);
+    out.radius = inner.number_or_auto("radius", 1e-9, 1e12);
+    if (const auto levels = inner.integer_or_auto("levels", 1, 12)) out.levels = static_cast<int>(*levels);
+    inner.finish();
+  }
+  out.eps_transfer = fields.number_or_auto("eps_transfer", 0, 1e6);
+  if (meshless) return out;
+  constexpr const char* kNothing = "means nothing where the solver is vertices";
+  if (points != nullptr) fields.error("points", kNothing, "solver: meshless");
+  if (fields.find("eps_transfer") != nullptr) fields.error("eps_transfer", kNothing, "solver: meshless");
+  return std::nullopt;
+}
+
 PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors) {
   PrtStep step;
   const auto small = [&](const char* name, std::int64_t low, std::int64_t high) -> std::optional<int> {
@@ -123,7 +142,7 @@ PrtStep read_prt(JsonFields& fields, const std::string& pointer, Errors& errors)
   step.order = small("order", 1, kMaxShOrder);
   step.bounces = small("bounces", 0, 64);
   step.samples = small("samples", 1, 65536);
-  fields.word("solver", {"vertices"});
+  step.meshless = read_meshless(fields, pointer, errors);
   constexpr PrtStep::Glossy kGlossy[] = {PrtStep::Glossy::automatic, PrtStep::Glossy::on, PrtStep::Glossy::off};
   if (const auto glossy = fields.word("glossy", {"auto", "on", "off"})) step.glossy = kGlossy[*glossy];
   constexpr PrtStep::Merge kMerge[] = {PrtStep::Merge::automatic, PrtStep::Merge::on, PrtStep::Merge::off};

@@ -62,6 +62,12 @@ struct PrtStep {
     on,
     off
   } merge = Merge::automatic;  // vertices that light and shape do not need: where they are many, always, never
+  struct Meshless {
+    std::optional<double> radius;  // of the coarsest points, in metres; auto when absent
+    std::optional<int> levels;
+    std::optional<double> eps_transfer;  // eps_T of core/meshless/glossy_points.h
+  };
+  std::optional<Meshless> meshless;  // solver: meshless; else light is gathered at the vertices
 };
 
 /// Light of one job at the vertices: no order, nothing to turn (core/meshless/radiosity.h).

@@ -50,8 +50,8 @@ json encoding_json(const PrtStep::Encoding& e) {
   return {{"form", kForms[static_cast<int>(e.form)]}, {"rank", or_auto(e.rank)}, {"bits", or_auto(e.bits)}};
 }
 
-/// `glossy` and `merge` are left out where they are auto, so that the hash of a recipe older than them, and with it the
-/// bytes of a scene without specular parts or needless vertices, are what they were.
+/// `glossy`, `merge` and `solver` are left out where they are the default, so that the hash of a recipe older than
+/// them, and with it the bytes of a scene without specular parts or needless vertices, are what they were.
 json step_json(const PrtStep& step) {
   json out = {{"do", "prt"},
               {"order", or_auto(step.order)},
@@ -61,6 +61,11 @@ json step_json(const PrtStep& step) {
               {"encoding", encoding_json(step.encoding)}};
   if (step.glossy != PrtStep::Glossy::automatic) out["glossy"] = step.glossy == PrtStep::Glossy::on ? "on" : "off";
   if (step.merge != PrtStep::Merge::automatic) out["merge"] = step.merge == PrtStep::Merge::on ? "on" : "off";
+  if (step.meshless) {
+    out["solver"] = "meshless";
+    out["points"] = {{"radius", or_auto(step.meshless->radius)}, {"levels", or_auto(step.meshless->levels)}};
+    out["eps_transfer"] = or_auto(step.meshless->eps_transfer);
+  }
   return out;
 }
 
@@ -171,6 +176,8 @@ const std::vector<Preset>& presets() {
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"draft"})"},
       {"prt-final", "The same, for delivery",
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"clear"},"quality":"final"})"},
+      {"glossy", "The same with what every surface mirrors, by transfer matrices at points where they change",
+       R"({"steps":[{"do":"prt","glossy":"on","solver":"meshless"}],"environment":{"builtin":"clear"}})"},
       {"overcast", "Relightable diffuse light under an overcast sky",
        R"({"steps":[{"do":"prt"}],"environment":{"builtin":"overcast"}})"},
       {"radiosity", "Light of one job, all reflections, under a clear sky with sun: not relightable, small and quick",

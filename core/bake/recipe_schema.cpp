@@ -39,12 +39,16 @@ std::string recipe_schema() {
     },
     "prt": {
       "type": "object", "required": ["do"], "additionalProperties": false,
+      "anyOf": [{"required": ["solver"], "properties": {"solver": {"const": "meshless"}}},
+                {"not": {"anyOf": [{"required": ["points"]}, {"required": ["eps_transfer"]}]}}],
       "properties": {
         "do": {"enum": ["prt"]},
         "order": {"description": "SH bands; coefficients = order^2", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 10}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "bounces": {"description": "reflections between surfaces", "anyOf": [{"type": "integer", "minimum": 0, "maximum": 64}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "samples": {"description": "rays per vertex", "anyOf": [{"type": "integer", "minimum": 1, "maximum": 65536}, {"$ref": "#/definitions/auto"}], "default": "auto"},
-        "solver": {"enum": ["vertices"], "default": "vertices"},
+        "solver": {"description": "where reflected light and matrices are computed: at every vertex, or at points on the surface, fewer where they change little", "enum": ["vertices", "meshless"], "default": "vertices"},
+        "points": {"$ref": "#/definitions/gather_points"},
+        "eps_transfer": {"description": "finer points have matrices where one differs in the 1-norm by more than this from what coarser points predict, in parts of the light that arrives", "anyOf": [{"type": "number", "minimum": 0, "maximum": 1e6}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "merge": {"description": "collapse edges that light and shape do not need, before vertices are added where light changes: auto where the input has many, on always", "enum": ["auto", "on", "off"], "default": "auto"},
         "glossy": {"description": "transfer matrices for specular reflection: auto where it shows, on everywhere", "enum": ["auto", "on", "off"], "default": "auto"},
         "subdivide": {"$ref": "#/definitions/subdivide"},

@@ -250,6 +250,34 @@ ordered_json glossy_object(const GlossyReport& g) {
   return out;
 }
 
+ordered_json seconds_object(const StageClock& clock) {
+  ordered_json out = ordered_json::object();
+  for (const auto& [name, seconds] : clock.seconds()) out[name] = seconds;
+  return out;
+}
+
+ordered_json meshless_object(const MeshlessOutcome& m) {
+  ordered_json out = ordered_json::object();
+  if (m.sweeps) {
+    out["reflections"] = {{"levels", m.sweeps->points.size()},       {"points", m.sweeps->points},
+                          {"gathered", m.sweeps->gathered},          {"alone", m.sweeps->alone},
+                          {"direct_rays", m.sweeps->direct_rays},    {"gather_rays", m.sweeps->gather_rays},
+                          {"seconds", seconds_object(m.sweep_clock)}};
+  }
+  if (m.matrices) {
+    out["matrices"] = {{"levels", m.matrices->points.size()},
+                       {"points", m.matrices->points},
+                       {"computed", m.matrices->computed},
+                       {"alone", m.matrices->alone},
+                       {"all", m.matrices->matrices()},
+                       {"vertices", m.matrix_vertices},
+                       {"norm_of_noise", m.matrices->noise},
+                       {"rays", m.matrix_rays},
+                       {"seconds", seconds_object(m.matrix_clock)}};
+  }
+  return out;
+}
+
 ordered_json merge_object(const MergeOutcome& m) {
   return {{"input_triangles", m.input_triangles},
           {"input_vertices", m.input_vertices},
@@ -299,22 +327,24 @@ ordered_json parameters_object(const Plan& plan) {
     return out;
   }
   constexpr const char* kMeasures[] = {"residual", "eq2", "eq3", "eq4"};
-  return {{"order", plan.order},
-          {"bounces", plan.bounces},
-          {"samples", plan.samples},
-          {"noise", plan.noise},
-          {"bounce_samples", plan.bounce_samples},
-          {"lamp_samples", plan.lamp_samples},
-          {"triangles", plan.subdivide.triangles},
-          {"measure", kMeasures[static_cast<int>(plan.subdivide.measure)]},
-          {"threshold", plan.subdivide.threshold},
-          {"max_depth", plan.subdivide.max_depth},
-          {"compression", plan.compression},
-          {"merge_error", plan.merge ? plan.merge->max_error : 0},
-          {"merge_reach", plan.merge ? plan.merge->max_reach : 0},
-          {"glossy_order", plan.glossy.order},
-          {"glossy_samples", plan.glossy ? plan.glossy.samples : 0},
-          {"glossy_compression", plan.glossy ? plan.glossy.compression : 0}};
+  ordered_json out = {{"order", plan.order},
+                      {"bounces", plan.bounces},
+                      {"samples", plan.samples},
+                      {"noise", plan.noise},
+                      {"bounce_samples", plan.bounce_samples},
+                      {"lamp_samples", plan.lamp_samples},
+                      {"triangles", plan.subdivide.triangles},
+                      {"measure", kMeasures[static_cast<int>(plan.subdivide.measure)]},
+                      {"threshold", plan.subdivide.threshold},
+                      {"max_depth", plan.subdivide.max_depth},
+                      {"compression", plan.compression},
+                      {"merge_error", plan.merge ? plan.merge->max_error : 0},
+                      {"merge_reach", plan.merge ? plan.merge->max_reach : 0},
+                      {"glossy_order", plan.glossy.order},
+                      {"glossy_samples", plan.glossy ? plan.glossy.samples : 0},
+                      {"glossy_compression", plan.glossy ? plan.glossy.compression : 0}};
+  if (plan.meshless) out["meshless"] = {{"eps", plan.meshless->eps}, {"eps_transfer", plan.meshless->eps_transfer}};
+  return out;
 }
 
 ordered_json prediction_object(const Prediction& p) {
@@ -440,6 +470,7 @@ std::string report_json(const ReportInput& in) {
   if (in.recipe.promise) out["promise"] = in.grid ? grid_promise(in.recipe.promise, *in.grid) : promise_object(in);
   if (in.field) out["lightfield"] = field_object(*in.field);
   if (in.glossy) out["glossy"] = glossy_object(*in.glossy);
+  if (in.meshless) out["meshless"] = meshless_object(*in.meshless);
   return text_of(out);
 }
 

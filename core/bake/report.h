@@ -52,6 +52,7 @@ struct ReportInput {
   const std::optional<PointsOutcome>& points;
   const std::optional<FieldOutcome>& field;
   const std::optional<GlossyReport>& glossy;
+  const std::optional<MeshlessOutcome>& meshless;
   const Passes& passes;  // none where a quality was asked for
 };
 

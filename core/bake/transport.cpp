@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/bake/direct_source.h"
+#include "core/bake/meshless_step.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/prt/cut_lines.h"
@@ -74,8 +75,8 @@ bool emission_has_hue(const Scene& scene) {
 }
 
 /// Matrices of the parts that are to have them, from the finished transfer vectors.
-GlossyBaked bake_matrices(const Tracer& tracer, const Transfer& transfer, const Plan& plan,
-                          const std::vector<double>& band_power, GlossyBake bake, Threads& threads) {
+GlossyBaked bake_matrices(const MeshlessWork& work, const Transfer& transfer, GlossyBake bake) {
+  const auto& [tracer, plan, band_power, seed, log, threads, outcome] = work;
   const std::vector<std::uint32_t> vertices = vertices_of_parts(tracer.scene().mesh, plan.glossy.parts);
   if (!plan.glossy || vertices.empty()) return {};
   bake.matrix = {.order = plan.glossy.order,
@@ -83,9 +84,10 @@ GlossyBaked bake_matrices(const Tracer& tracer, const Transfer& transfer, const 
                  .fixed = transfer.fixed,
                  .reflected = plan.bounces > 0,
                  .samples = plan.glossy.samples,
-                 .seed = bake.matrix.seed};
-  bake.band_power.assign(band_power.begin(), band_power.begin() + plan.glossy.order);
-  bake.left_out = plan.glossy.compression / std::sqrt(2.0);  // the other half of the square is for rounding
+                 .seed = seed};
+  bake.rank.band_power.assign(band_power.begin(), band_power.begin() + plan.glossy.order);
+  bake.rank.left_out = plan.glossy.compression / std::sqrt(2.0);  // the other half of the square is for rounding
+  if (plan.meshless) return matrices_on_points(work, transfer, vertices, std::move(bake));
   return bake_glossy(tracer, transfer, vertices, bake, threads);
 }
 
@@ -96,6 +98,44 @@ void skip_bounces_of_open_scene(Plan& plan, const DirectSource& source) {
     if (d.decision == "bounces")
       d = {"bounces", "0", "no surface rises above any other: nothing can be lit indirectly"};
   }
+}
+
+/// Direct light at the vertices.
+struct DirectAtVertices {
+  std::vector<float> sky;
+  std::vector<Vec3f> lamps;
+  const std::vector<StandIn>& stand_ins;
+  std::vector<std::uint32_t> probes;
+};
+
+constexpr std::size_t kPointProbes = 64;  // where light is read from points: each reads about ten
+
+/// Adds reflected light, at the vertices or on points.
+void reflect(const MeshlessWork& work, DirectAtVertices direct, Transport& out) {
+  const Plan& plan = work.plan;
+  ProbeNoise noise;
+  if (plan.meshless && plan.bounces > 0) {
+    direct.probes = choose_probes(work.tracer.scene().mesh, kPointProbes);
+    SweptTransfer swept = sweep_on_points(work, direct.sky, direct.lamps, direct.stand_ins, direct.probes);
+    out.transfer = std::move(swept.transfer);
+    out.bounce_rays = swept.stats.gather_rays;
+    noise = std::move(swept.noise);
+  } else {
+    TransferStats stats;
+    out.transfer = bake_interreflection(
+        work.tracer, work.tracer.scene().mesh, std::move(direct.sky), std::move(direct.lamps),
+        {.order = plan.order,
+         .bounces = plan.bounces,
+         .samples = plan.bounce_samples,
+         .seed = work.seed,
+         .stand_ins = direct.stand_ins,
+         .probes = direct.probes,
+         .progress = [&log = work.log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
+        work.threads, &stats, &noise);
+    out.bounce_rays = stats.rays;
+    work.log.count_rays(stats.rays);
+  }
+  if (plan.bounces > 0) out.noise.reflected = {std::move(direct.probes), std::move(noise.difference)};
 }
 
 }  // namespace
@@ -152,29 +192,17 @@ Transport solve_transport(Scene& scene, Plan& plan, const std::vector<double>& b
 
   log.begin("bounces", 0.85);
   const Tracer tracer(scene, threads);
-  TransferStats stats;
-  ProbeNoise reflected;
-  out.transfer =
-      bake_interreflection(tracer, scene.mesh, std::move(sky), std::move(lamps),
-                           {.order = plan.order,
-                            .bounces = plan.bounces,
-                            .samples = plan.bounce_samples,
-                            .seed = seed,
-                            .stand_ins = stand_ins,
-                            .probes = probes,
-                            .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }},
-                           threads, &stats, &reflected);
-  if (plan.bounces > 0) out.noise.reflected = {std::move(probes), std::move(reflected.difference)};
-  out.bounce_rays = stats.rays;
-  log.count_rays(stats.rays);
+  MeshlessOutcome points;
+  const MeshlessWork work{tracer, plan, band_power, seed, log, threads, points};
+  reflect(work, {std::move(sky), std::move(lamps), stand_ins, std::move(probes)}, out);
   if (plan.glossy) {
     log.begin("glossy", 0.88);
     GlossyBake bake{.stand_ins = std::move(stand_ins),
                     .progress = [&log](std::uint64_t done, std::uint64_t all) { log.advance(done, all); }};
-    bake.matrix.seed = seed;
-    out.glossy = bake_matrices(tracer, out.transfer, plan, band_power, std::move(bake), threads);
+    out.glossy = bake_matrices(work, out.transfer, std::move(bake));
     log.count_rays(out.glossy.rays);
   }
+  if (plan.meshless) out.meshless = std::move(points);
   return out;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/bake/bake_log.h"
 #include "core/bake/merge_step.h"
+#include "core/bake/meshless_plan.h"
 #include "core/bake/plan.h"
 #include "core/base/threads.h"
 #include "core/prt/direct_transfer.h"
@@ -39,6 +40,7 @@ struct Transport {
   NoiseProbes noise;
   std::uint64_t bounce_rays = 0;
   GlossyBaked glossy;  // as planned
+  std::optional<MeshlessOutcome> meshless;
 };
 
 /// The mesh that subdivision starts from. At most half of the new triangles go to lines where the light of `source`

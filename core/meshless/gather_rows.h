@@ -58,6 +58,13 @@ class GatherRows {
   /// Equations 1 and 2; c_p has no direction. `point` is the one that the row was traced for.
   VectorValue apply_vector(std::size_t row, const TransferPoint& point, std::span<const Vec3f> senders) const;
 
+  /// The rays of a row that found a sender.
+  std::span<const RowEntry> entries(std::size_t row) const {
+    return std::span(chunks_[row_[row].chunk]).subspan(row_[row].first, row_[row].count);
+  }
+  /// c_p of equation 1.
+  Vec3f constant(std::size_t row) const { return row_[row].constant; }
+
   /// One ray of a row: its share of equation 1 for a sender of 1, and w / (n . w) - n of equation 2.
   struct Ray {
     std::uint32_t sender = 0;

@@ -17,13 +17,18 @@ constexpr double kPointsPerDisk = 0.7;  // A / R^2 of a full level times this is
 constexpr double kFewestWanted = 8192, kMostWanted = 262144;
 constexpr int kAutoLevels = 5;
 
+/// 0 where the triangle gets no points.
+double area_of(const Mesh& mesh, const PointPlacement& placement, std::size_t t) {
+  return placement.parts.empty() || placement.parts[mesh.part[t]] ? triangle_area(mesh, mesh.triangles[t]) : 0.0;
+}
+
 /// Triangles by area, in constant time: a guide table into the running sum.
 class AreaSampler {
  public:
-  explicit AreaSampler(const Mesh& mesh) {
+  AreaSampler(const Mesh& mesh, const PointPlacement& placement) {
     double sum = 0;
     cumulative_.reserve(mesh.triangles.size());
-    for (const Triangle& t : mesh.triangles) cumulative_.push_back(sum += triangle_area(mesh, t));
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) cumulative_.push_back(sum += area_of(mesh, placement, t));
     guide_.reserve(cumulative_.size());
     std::uint32_t t = 0;
     for (std::size_t i = 0; i < cumulative_.size(); ++i) {
@@ -67,9 +72,15 @@ bool has_room(const PointGrid& grid, const std::vector<MeshlessPoint>& points, c
 
 double expected_points(double area, double radius) { return kPointsPerDisk * area / (radius * radius); }
 
+double placed_area(const PointPlacement& placement, const Scene& scene) {
+  double sum = 0;
+  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) sum += area_of(scene.mesh, placement, t);
+  return sum;
+}
+
 PointPlacement resolve(const PointPlacement& asked, const Scene& scene) {
   PointPlacement out = asked;
-  const double area = surface_area(scene.mesh);
+  const double area = placed_area(asked, scene);
   if (out.levels <= 0) out.levels = kAutoLevels;
   if (out.wanted == 0) {
     const double half = 0.5 * static_cast<double>(scene.mesh.position.size());
@@ -118,7 +129,7 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
   const Scene& scene = tracer.scene();
   const PointPlacement params = resolve(asked, scene);
   EXPECTS(params.levels <= kMaxPointLevels && std::isfinite(params.radius));
-  const AreaSampler triangles(scene.mesh);
+  const AreaSampler triangles(scene.mesh, params);
   const bool two_sided = params.both_sides > 0;
   PointHierarchy out;
   if (!(triangles.total() > 0)) return out;

@@ -40,11 +40,12 @@ struct MeshlessPoint {
 };
 
 struct PointPlacement {
-  float radius = 0;             // R of level 0; 0: auto, so that all levels together have about `wanted` points
-  int levels = 0;               // 0: auto
-  std::uint64_t wanted = 0;     // points on all levels where the radius is auto; 0: auto
-  int both_sides = 0;           // levels with points on both sides of double-sided faces
-  bool groups_by_part = false;  // each part is a reconstruction group of its own; else the scene is one
+  float radius = 0;              // R of level 0; 0: auto, so that all levels together have about `wanted` points
+  int levels = 0;                // 0: auto
+  std::uint64_t wanted = 0;      // points on all levels where the radius is auto; 0: auto
+  int both_sides = 0;            // levels with points on both sides of double-sided faces
+  bool groups_by_part = false;   // each part is a reconstruction group of its own; else the scene is one
+  std::vector<bool> parts = {};  // of the scene, those that get points; empty: all
   std::uint64_t seed = 0;
 };
 
@@ -69,6 +70,9 @@ PointPlacement resolve(const PointPlacement&, const Scene&);
 /// About how many points this much area takes down to radius R: .7 A / R^2 on smooth surfaces (measured). Callers
 /// refuse what would be too many: place_points goes through with any number below 2^31.
 double expected_points(double area, double radius);
+
+/// Of the parts that get points.
+double placed_area(const PointPlacement&, const Scene&);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -98,6 +99,13 @@ struct GlossyMatrixBaker::State {
     return traced ? static_cast<std::uint64_t>(samples_) : 0;
   }
 
+  void open(const Vec3f& normal, float* out) const {
+    const Basis<float> basis = basis_around(normal);
+    Numbers sky = open_;
+    for (std::size_t o = 0; o < count_; ++o) rotate_sh(params_.order, basis, &sky[o * count_], &sky[o * count_]);
+    write(basis, sky, Numbers(channels_ * count_ * inputs_, 0.0F), 0, out);
+  }
+
   static Basis<float> turned(const Vec3f& normal, float azimuth) {
     const Basis<float> plain = basis_around(normal);
     const float c = std::cos(azimuth), s = std::sin(azimuth);
@@ -182,6 +190,12 @@ struct GlossyMatrixBaker::State {
   std::vector<HalfSpace> sets_;
 };
 
+GlossyMatrix another_draw(const GlossyMatrix& first) {
+  GlossyMatrix out = first;
+  out.seed = mix64(first.seed ^ 0x6e6f697365ULL);
+  return out;
+}
+
 GlossyMatrixBaker::GlossyMatrixBaker(const Tracer& tracer, const Transfer& light, const GlossyMatrix& params) {
   EXPECTS(params.order >= 1 && params.order <= std::min(light.order, kMaxShOrder));
   EXPECTS(params.channels == 3 || params.channels == 1);
@@ -196,5 +210,17 @@ GlossyMatrixBaker::~GlossyMatrixBaker() = default;
 std::size_t GlossyMatrixBaker::stride() const { return state_->channels_ * state_->count_ * state_->inputs_; }
 
 std::uint64_t GlossyMatrixBaker::bake(const TransferPoint& point, float* out) const { return state_->bake(point, out); }
+
+std::vector<float> GlossyMatrixBaker::bake(std::span<const TransferPoint> points, Threads& threads,
+                                           std::uint64_t& rays) const {
+  std::vector<float> out(points.size() * stride());
+  std::atomic<std::uint64_t> traced = 0;
+  threads.for_blocks(points.size(), 1,
+                     [&](std::size_t n, std::size_t) { traced += bake(points[n], &out[n * stride()]); });
+  rays += traced;
+  return out;
+}
+
+void GlossyMatrixBaker::open(const Vec3f& normal, float* out) const { state_->open(normal, out); }
 
 }  // namespace kiln

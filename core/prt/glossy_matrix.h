@@ -11,8 +11,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "core/base/threads.h"
 #include "core/prt/transfer.h"
 #include "core/prt/transfer_point.h"
 #include "core/trace/tracer.h"
@@ -28,6 +30,9 @@ struct GlossyMatrix {
   std::uint64_t seed = 0;
 };
 
+/// The same matrices from rays of their own.
+GlossyMatrix another_draw(const GlossyMatrix&);
+
 /// For many points of one scene. `light` belongs to the vertices of tracer.scene().mesh.
 class GlossyMatrixBaker {
  public:
@@ -39,6 +44,10 @@ class GlossyMatrixBaker {
   std::size_t stride() const;
   /// Returns the rays it took.
   std::uint64_t bake(const TransferPoint&, float* out) const;
+  /// Matrices of many points, one after the other. Adds the rays to `rays`.
+  std::vector<float> bake(std::span<const TransferPoint>, Threads&, std::uint64_t& rays) const;
+  /// The matrix of a point with this normal that nothing rises above.
+  void open(const Vec3f& normal, float* out) const;
 
  private:
   struct State;

@@ -162,4 +162,16 @@ std::vector<bool> hidden_middles(const Mesh& mesh, const std::vector<MeshEdge>& 
   return out;
 }
 
+std::vector<TransferPoint> lit_places(const Mesh& mesh, std::span<const std::uint32_t> vertices,
+                                      std::span<const StandIn> stand_ins) {
+  const std::vector<std::uint32_t> face = widest_faces(mesh);
+  std::vector<TransferPoint> out;
+  for (const std::uint32_t v : vertices) {
+    const auto found = std::ranges::lower_bound(stand_ins, v, {}, &StandIn::vertex);
+    const bool stands_in = found != stand_ins.end() && found->vertex == v;
+    out.push_back(stands_in ? found->point : vertex_point(mesh, v, face[v]));
+  }
+  return out;
+}
+
 }  // namespace kiln

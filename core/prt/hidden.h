@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "core/base/threads.h"
@@ -37,6 +38,9 @@ struct StandIn {
 /// contact line the sample of a vertex may have leant to the hidden side and the vertex itself (vertex_points) not:
 /// then it stands in for itself.
 std::vector<StandIn> find_stand_ins(const Mesh&, const std::vector<bool>& dark, const HiddenTest&, Threads&);
+
+/// Where vertices are lit: in their own places, or in those of their stand-ins (ascending).
+std::vector<TransferPoint> lit_places(const Mesh&, std::span<const std::uint32_t> vertices, std::span<const StandIn>);
 
 /// Which of some edges (ascending) have a middle that is hidden on one of their faces.
 std::vector<bool> hidden_middles(const Mesh&, const std::vector<MeshEdge>&, const HiddenTest&, Threads&);

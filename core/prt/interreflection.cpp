@@ -81,8 +81,9 @@ class Solver {
         direct_(params.order, 1, direct_storage_.data(), PackedRows::row_bytes(params.order, 1)),
         fixed_direct_(std::move(fixed)) {
     for (std::size_t v = 0; v < mesh_.position.size(); ++v) direct_.store(v, direct.data() + v * count());
-    const bool grey = (faces_.grey() || params.bounces == 0) && lamps_are_grey(fixed_direct_, tracer.scene());
-    out_ = {.order = params.order, .channels = grey ? 1 : 3, .fixed = !fixed_direct_.empty(), .coefficients = {}};
+    const bool grey = params.bounces == 0 && lamps_are_grey(fixed_direct_, tracer.scene());
+    const int channels = grey ? 1 : transfer_channels(faces_, tracer.scene(), fixed_direct_);
+    out_ = {.order = params.order, .channels = channels, .fixed = !fixed_direct_.empty(), .coefficients = {}};
     pitch_ = pitch_of(out_);
   }
 
@@ -239,21 +240,9 @@ class Solver {
       const std::span<const float> reflected = gatherer.result();
       for (std::size_t i = 0; i < reflected.size(); ++i) row[i] += reflected[i];
       fixed += gatherer.fixed();
-      limit(row);
+      limit_transfer({.order = params_.order, .channels = out_.channels, .coefficients = {}}, row.data());
     }
     store(next, v, row, fixed, pass + 1 < params_.bounces);
-  }
-
-  // Under a constant sky of 1 nothing is brighter than 1. Open sky and hits are counted with different rays, and direct
-  // light may be fitted (fit_vertices.h): a vector with more than there is shrinks to it, as a whole.
-  void limit(Row& row) const {
-    constexpr float kAll = 0.28209479F;  // Y(0,0)
-    for (std::size_t c = 0; c < static_cast<std::size_t>(out_.channels); ++c) {
-      float* t = row.data() + c * count();
-      if (t[0] <= kAll) continue;
-      const float share = kAll / t[0];
-      for (std::size_t i = 0; i < count(); ++i) t[i] *= share;
-    }
   }
 
   TransferPoint point_of(std::uint32_t v) const {
@@ -302,6 +291,20 @@ std::uint64_t rays_per_vertex(const Interreflection& params) {
   const int late = std::min(params.bounces, kLatePasses);
   return static_cast<std::uint64_t>(late) * static_cast<std::uint64_t>(params.samples) +
          static_cast<std::uint64_t>(params.bounces - late) * static_cast<std::uint64_t>(early_samples(params));
+}
+
+int transfer_channels(const GatherFaces& faces, const Scene& scene, const std::vector<Vec3f>& fixed_direct) {
+  return faces.grey() && lamps_are_grey(fixed_direct, scene) ? 1 : 3;
+}
+
+void limit_transfer(const Transfer& shape, float* row) {
+  constexpr float kAll = 0.28209479F;  // Y(0,0)
+  const auto count = static_cast<std::size_t>(sh_count(shape.order));
+  for (int c = 0; c < shape.channels; ++c, row += shape.slots()) {
+    if (row[0] <= kAll) continue;
+    const float share = kAll / row[0];
+    for (std::size_t i = 0; i < count; ++i) row[i] *= share;
+  }
 }
 
 Transfer bake_interreflection(const Tracer& tracer, const Mesh& mesh, std::vector<float> direct,

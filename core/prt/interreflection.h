@@ -13,6 +13,7 @@
 
 #include "core/base/threads.h"
 #include "core/prt/direct_transfer.h"
+#include "core/prt/gather_faces.h"
 #include "core/prt/hidden.h"
 #include "core/prt/transfer.h"
 #include "core/trace/tracer.h"
@@ -45,6 +46,14 @@ std::uint64_t rays_per_vertex(const Interreflection&);
 Transfer bake_interreflection(const Tracer&, const Mesh& mesh, std::vector<float> direct,
                               std::vector<Vec3f> fixed_direct, const Interreflection&, Threads&,
                               TransferStats* stats = nullptr, ProbeNoise* noise = nullptr);
+
+/// 1 where no colour can come into reflected light, else 3. `fixed_direct`: of vertices and other points.
+int transfer_channels(const GatherFaces&, const Scene&, const std::vector<Vec3f>& fixed_direct);
+
+/// Under a constant sky of 1 nothing is brighter than 1. Open sky and hits are counted with different rays, and direct
+/// light may be fitted (fit_vertices.h): a vector with more than there is shrinks to it, each channel as a whole; the
+/// fixed slots stay. `row` has `shape`'s stride.
+void limit_transfer(const Transfer& shape, float* row);
 
 /// Direct light of emitters and punctual lights at points: irradiance / pi, RGB.
 struct FixedDirect {

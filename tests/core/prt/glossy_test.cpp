@@ -269,12 +269,11 @@ Baked bake_column(double left_out, int threads_count = 2) {
     if (v % 3 != 1) vertices.push_back(v);
   }
   const GlossyMatrix params{.order = kOrder, .channels = out.light.channels, .reflected = true, .samples = 256};
-  out.glossy = bake_glossy(tracer, out.light, vertices,
-                           {.matrix = params,
-                            .band_power = std::vector<double>(kOrder, 4 * std::numbers::pi),
-                            .left_out = left_out,
-                            .most = 512},
-                           threads);
+  out.glossy = bake_glossy(
+      tracer, out.light, vertices,
+      {.matrix = params,
+       .rank = {.band_power = std::vector<double>(kOrder, 4 * std::numbers::pi), .left_out = left_out, .most = 512}},
+      threads);
   const GlossyMatrixBaker baker(tracer, out.light, params);
   for (const auto v : vertices) {
     out.exact.emplace_back(baker.stride());

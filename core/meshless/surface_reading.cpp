@@ -1,0 +1,64 @@
+#include "core/meshless/surface_reading.h"
+
+#include "core/meshless/demand.h"
+
+namespace kiln {
+namespace {
+
+constexpr std::size_t kBlock = 128;
+
+Reading read_computed(const SurfaceReading::Surface& surface, std::span<const std::uint32_t> computed, int neighbours,
+                      Threads& threads) {
+  std::vector<SurfaceSite> sites;
+  for (const std::uint32_t p : computed) sites.push_back(surface.points.points[p].site);
+  return {surface.tracer, sites, neighbours, threads};
+}
+
+std::vector<Readings::Place> places_of(const PointHierarchy& points) {
+  std::vector<Readings::Place> places;
+  for (const MeshlessPoint& p : points.points) places.push_back({transfer_point(p), p.site.group});
+  return places;
+}
+
+}  // namespace
+
+SurfaceReading::SurfaceReading(const Surface& surface, std::span<const std::uint32_t> computed, int neighbours,
+                               Threads& threads)
+    : SurfaceReading(surface, read_computed(surface, computed, neighbours, threads), computed, threads) {}
+
+SurfaceReading::SurfaceReading(const Surface& surface, const Reading& reading, std::span<const std::uint32_t> computed,
+                               Threads& threads)
+    : at_points_(reading, places_of(surface.points), threads),
+      at_vertices_(reading, surface.vertices, threads),
+      self_(surface.points.points.size()),
+      nearest_(surface.vertices.size(), Senders::kNone) {
+  for (std::uint32_t n = 0; n < computed.size(); ++n) self_[computed[n]] = {n, 1};
+  const float radius = surface.points.radius.empty() ? 0.0F : surface.points.radius.back();
+  threads.for_blocks(nearest_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      if (!at_vertices_.any(v)) nearest_[v] = surface.senders.nearest(reader_site(surface.vertices[v], radius));
+    }
+  });
+  for (std::uint32_t v = 0; v < nearest_.size(); ++v) {
+    if (of_vertex(v).empty()) alone_.push_back(v);
+  }
+}
+
+std::span<const BasisTerm> SurfaceReading::of_point(std::size_t point) const {
+  return self_[point].value > 0 ? std::span(&self_[point], 1) : at_points_.terms(point);
+}
+
+std::span<const BasisTerm> SurfaceReading::of_vertex(std::size_t vertex) const {
+  if (nearest_[vertex] == Senders::kNone) return at_vertices_.terms(vertex);
+  return of_point(nearest_[vertex]);
+}
+
+std::vector<std::uint32_t> SurfaceReading::unseen() const {
+  std::vector<std::uint32_t> out;
+  for (std::uint32_t p = 0; p < self_.size(); ++p) {
+    if (of_point(p).empty()) out.push_back(p);
+  }
+  return out;
+}
+
+}  // namespace kiln

@@ -1,0 +1,47 @@
+#pragma once
+// How points and vertices read light from the points that were computed, as sparse rows over those.
+// Points   a computed one reads itself; others what they see of computed ones (reading.h), or nothing.
+// Vertices what they see of computed ones; else what the nearest point that they see reads (senders.h). Vertices that
+//          see no point at all are `alone`: they must find their light themselves.
+// Repeat   same bits for any thread count
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/threads.h"
+#include "core/meshless/points.h"
+#include "core/meshless/reading.h"
+#include "core/meshless/senders.h"
+
+namespace kiln {
+
+class SurfaceReading {
+ public:
+  struct Surface {
+    const Tracer& tracer;
+    const PointHierarchy& points;
+    const Senders& senders;
+    std::span<const Readings::Place> vertices;
+  };
+  /// `computed` holds points, in the order of what is read.
+  SurfaceReading(const Surface&, std::span<const std::uint32_t> computed, int neighbours, Threads&);
+
+  /// Indices into `computed`, and weights that add up to 1; empty where nothing is seen.
+  std::span<const BasisTerm> of_point(std::size_t point) const;
+  std::span<const BasisTerm> of_vertex(std::size_t vertex) const;
+
+  /// Points that read nothing.
+  std::vector<std::uint32_t> unseen() const;
+  const std::vector<std::uint32_t>& alone() const { return alone_; }  // vertices, ascending
+
+ private:
+  SurfaceReading(const Surface&, const Reading&, std::span<const std::uint32_t> computed, Threads&);
+
+  Readings at_points_, at_vertices_;
+  std::vector<BasisTerm> self_;         // of each point: itself among the computed ones, or no weight
+  std::vector<std::uint32_t> nearest_;  // of vertices that see no computed point, or Senders::kNone
+  std::vector<std::uint32_t> alone_;
+};
+
+}  // namespace kiln

@@ -1,0 +1,5 @@
+if(TARGET kiln_bake)
+  add_executable(kiln_solvers solvers.cpp)
+  kiln_flags(kiln_solvers)
+  target_link_libraries(kiln_solvers PRIVATE kiln_bake nlohmann_json::nlohmann_json)
+endif()
