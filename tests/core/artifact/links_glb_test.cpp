@@ -138,7 +138,7 @@ TEST(LinksGlb, WhatDoesNotFitTogetherIsNamed) {
   EXPECT_EQ(code_of(changed([](LightLinks& l) { l.sites.pop_back(); })), "slot_count_mismatch");
   EXPECT_EQ(code_of(changed([](LightLinks& l) { l.term_begin.pop_back(); })), "slot_count_mismatch");
   EXPECT_EQ(code_of(changed([](LightLinks& l) { l.senders = 21; })), "slot_count_mismatch");
-  EXPECT_EQ(code_of(with_header("version", 2)), "unsupported_version");
+  EXPECT_EQ(code_of(with_header("version", 3)), "unsupported_version");
   EXPECT_EQ(code_of(with_header("senders", "many")), "json_type");
   EXPECT_EQ(code_of(with_header("nodes", 70000)), "number_out_of_range");
   EXPECT_EQ(code_of(with_header("sweeps", 1e9)), "number_out_of_range");
