@@ -10,6 +10,7 @@
 
 #include "core/prt/ray_origin.h"
 #include "core/trace/reference.h"
+#include "tests/core/meshless/odd_scenes.h"
 #include "tests/core/prt/test_scenes.h"
 
 namespace kiln {
@@ -146,18 +147,8 @@ void expect_finite(const Scene& scene, TransferSweeps params) {
 }
 
 TEST(TransferSweeps, OneTriangleCoincidentSheetsAndAbsurdRadiiGiveLight) {
-  Scene one = testing::empty_scene();
-  one.mesh.position = {{-0.5F, 0, -0.5F}, {0, 0, 0.5F}, {0.5F, 0, -0.5F}};
-  one.mesh.normal.assign(3, {0, 1, 0});
-  one.mesh.triangles = {{0, 1, 2}};
-  one.mesh.part = {0};
-  Scene flat = one;
-  flat.mesh.position[2] = flat.mesh.position[0];  // no area: no points
-  Scene sheets = testing::empty_scene();
-  for (const float height : {0.0F, 0.0F, 1e-6F})
-    testing::add_grid(sheets, {-0.5F, height, -0.5F}, {0, 0, 1}, {1, 0, 0}, 3, 3);
   const TransferSweeps params = params_of(2, 2, 16);
-  for (const Scene& scene : {one, flat, sheets, testing::random_scene(7, 60)}) {
+  for (const Scene& scene : testing::odd_scenes(60)) {
     expect_finite(scene, params);
     for (const float radius : {1e4F, 0.02F}) {
       TransferSweeps other = params;
