@@ -195,6 +195,7 @@ Result<void> visit_part_primitives(const BakedScene& baked, const GeometryOption
       builder.add_coefficients(*options.transfer, [&](std::size_t k) { return options.transfer->name(k); });
     if (options.field) builder.add_coefficients(options.field->numbers(), field_name);
     if (options.field && options.field->visibility()) builder.add_coefficients(*options.field->visibility(), sky_name);
+    if (options.field && options.field->lamps()) builder.add_coefficients(*options.field->lamps(), lamp_name);
     if (options.glossy) builder.add_matrices(*options.glossy);
     if (auto done = visit(builder.take()); !done) return done;
   }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "core/artifact/json_fields.h"
+#include "core/lightfield/lamp_highlights.h"
 
 namespace kiln {
 namespace {
@@ -39,15 +41,20 @@ std::vector<double> numbers(const json& array, const std::string& place, std::si
   return out;
 }
 
-void check_conventions(const Fields& extension, std::uint64_t version, Findings& findings) {
-  if (extension.count("version", 0) != version) {
-    findings.fail("unsupported_version", "Only version " + std::to_string(version) + " of the extension is read.",
-                  extension.pointer("version"));
-  }
+void check_basis(const Fields& extension, Findings& findings) {
   if (extension.text("basis") != "real-sh" || extension.flag("condonShortley", true)) {
     findings.fail("not_a_baked_scene", "The basis must be real-sh without the Condon-Shortley phase.",
                   extension.pointer("basis"));
   }
+}
+
+void check_version(const Fields& extension, std::uint64_t least, std::uint64_t most, Findings& findings) {
+  const std::uint64_t version = extension.count("version", 0);
+  if (version >= least && version <= most) return;
+  const std::string known = (least < most ? "s " + std::to_string(least) + " to " : " ") + std::to_string(most);
+  findings.fail("unsupported_version",
+                "Only version" + known + " of the extension " + (least < most ? "are" : "is") + " read.",
+                extension.pointer("version"));
 }
 
 Transfer read_shape(const Fields& extension, Findings& findings) {
@@ -146,11 +153,70 @@ void read_sky(const json& root, const Fields& extension, BakedHeader& out, Findi
   out.sky = std::move(sky);
 }
 
+Vec3f float_vector(const std::array<double, 3>& x) {
+  return {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])};
+}
+
+/// One of them, in unit-cube lengths.
+FieldLamp read_lamp(const Fields& fields, Findings& findings) {
+  constexpr double kHalfTurn = 0.5 * std::numbers::pi + 1e-6, kUnit = 1e-3;
+  Light out;
+  const std::string type = fields.text("type");
+  if (type != "directional" && type != "point" && type != "spot")
+    findings.fail("not_a_baked_scene", "A lamp is directional, a point or a spot.", fields.pointer("type"));
+  out.type = type == "directional" ? LightType::directional : type == "spot" ? LightType::spot : LightType::point;
+  const auto in_range = [&](const char* member, double x, double most) {
+    if (!(x >= 0 && x <= most))
+      findings.fail("number_out_of_range", "The number is not in range.", fields.pointer(member));
+    return static_cast<float>(x);
+  };
+  const auto vector = [&](const char* member, double least) {
+    const std::array<double, 3> x = fields.numbers<3>(member, {-HUGE_VAL, 0, 0});
+    for (const double c : x)
+      if (!(c >= least && c <= kLargest))
+        findings.fail("number_out_of_range", "These are not three numbers in range.", fields.pointer(member));
+    return float_vector(x);
+  };
+  out.intensity = vector("intensity", 0);
+  const Vec3f mean = vector("mean", 0);
+  if (out.type != LightType::point) {
+    out.direction = vector("direction", -1 - kUnit);
+    if (std::abs(double{length(out.direction)} - 1) > kUnit)
+      findings.fail("number_out_of_range", "A direction has length 1.", fields.pointer("direction"));
+  }
+  if (out.type != LightType::directional) {
+    out.position = vector("position", -kLargest);
+    out.range = in_range("range", fields.number("range", 0), kLargest);
+  }
+  if (out.type == LightType::spot) {
+    out.outer_cone = in_range("outerConeAngle", fields.number("outerConeAngle", -1), kHalfTurn);
+    out.inner_cone = in_range("innerConeAngle", fields.number("innerConeAngle", -1), double{out.outer_cone});
+  }
+  return findings.failed() ? FieldLamp{} : make_field_lamp(out, mean);
+}
+
+/// What the r-RFs leave to lamps, if they do.
+void read_lamps(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+  if (!extension.has("lamps")) return;
+  const Fields fields = extension.object("lamps");
+  const std::size_t count = fields.size("lights");
+  if (count < 1 || count > kMostFieldLamps)
+    return findings.fail("number_out_of_range", "There must be 1 to " + std::to_string(kMostFieldLamps) + " lamps.",
+                         fields.pointer("lights"));
+  fields.for_each("lights", [&](const Fields& lamp) { out.lamps.push_back(read_lamp(lamp, findings)); });
+  if (findings.failed()) return;
+  int no_components = -1;
+  out.lamp_form = read_form(root, fields, lamp_shape(count), lamp_name, no_components, findings);
+  if (!out.lamp_form.raw())
+    findings.fail("not_a_baked_scene", "What is seen of lamps must be raw.", fields.pointer("form"));
+}
+
 /// The r-RFs, if there are any.
 void read_field(const json& root, BakedHeader& out, Findings& findings) {
   if (!at(root, kFieldPlace).is_object()) return;
   const Fields extension(at(root, kFieldPlace), kFieldPlace, findings);
-  check_conventions(extension, 1, findings);
+  check_version(extension, 1, 2, findings);
+  check_basis(extension, findings);
   if (!extension.flag("reflected", false))
     findings.fail("not_a_baked_scene", "Radiance functions must be reflected.", extension.pointer("reflected"));
   const std::uint64_t degree = extension.count("degree", kMaxLightFieldDegree + 1);
@@ -161,6 +227,7 @@ void read_field(const json& root, BakedHeader& out, Findings& findings) {
   out.field_shape = field_shape(static_cast<int>(degree));
   out.field_form = read_form(root, extension, out.field_shape, field_name, out.field_view, findings);
   read_sky(root, extension, out, findings);
+  read_lamps(root, extension, out, findings);
 }
 
 /// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.
@@ -245,7 +312,8 @@ BakedHeader read_baked_header(std::span<const std::uint8_t> text, Findings& find
     return out;
   }
   const Fields extension(at(root, kPlace), kPlace, findings);
-  check_conventions(extension, 2, findings);
+  check_version(extension, 2, 2, findings);
+  check_basis(extension, findings);
   out.shape = read_shape(extension, findings);
   if (findings.failed()) return out;
   const auto name = [&](std::size_t k) { return stored_name(out.shape, k); };

@@ -35,7 +35,9 @@ struct BakedHeader {
     double slope = 0;
   };
   std::optional<Sky> sky;
-  GlossyTransfer glossy;  // its shape; of rank 0 (and order 0) where there are no matrices
+  std::vector<FieldLamp> lamps;  // that the field keeps apart
+  StoredForm lamp_form;          // of how much of them is seen
+  GlossyTransfer glossy;         // its shape; of rank 0 (and order 0) where there are no matrices
   StoredForm glossy_form;
   int glossy_view = -1, lobes_view = -1;  // checked as components_view
   BakedLight light;

@@ -175,7 +175,7 @@ void read_matrices(const BakedFile& file, StreamReader& streams, std::size_t fir
 
 /// The stored numbers of a light field.
 struct FieldNumbers {
-  Transfer series, visibility;
+  Transfer series, visibility, lamps;
 };
 
 void read_part(const BakedFile& file, std::size_t i, BakedScene& out, FieldNumbers& field, Findings& findings) {
@@ -205,6 +205,7 @@ void read_part(const BakedFile& file, std::size_t i, BakedScene& out, FieldNumbe
       h.form, streams, [&](std::size_t k) { return stored_name(h.shape, k); }, first, vertices, out.transfer);
   if (h.has_field) read_coefficients(h.field_form, streams, field_name, first, vertices, field.series);
   if (h.sky) read_coefficients(h.sky->form, streams, sky_name, first, vertices, field.visibility);
+  if (!h.lamps.empty()) read_coefficients(h.lamp_form, streams, lamp_name, first, vertices, field.lamps);
   if (header.glossy) read_matrices(file, streams, first, vertices, out.glossy);
   check_geometry(mesh, first, place, findings);
   out.scene.parts.push_back(part);
@@ -297,7 +298,7 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.exposure = file.header.exposure;
   out.provenance = file.header.provenance;
   out.scene.frame = read_frame(file.document, findings);
-  FieldNumbers field{file.header.field_shape, visibility_shape()};
+  FieldNumbers field{file.header.field_shape, visibility_shape(), lamp_shape(file.header.lamps.size())};
   for (std::size_t i = 0; i < file.header.parts.size() && !findings.failed(); ++i)
     read_part(file, i, out, field, findings);
   if (findings.failed()) return out;
@@ -305,7 +306,9 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.field = {.degree = std::max(0, field.series.order - 1),
                .coefficients = std::move(field.series.coefficients),
                .visibility = std::move(field.visibility.coefficients),
-               .sky = {}};
+               .sky = {},
+               .lamps = file.header.lamps,
+               .lamp_visibility = std::move(field.lamps.coefficients)};
   if (file.header.sky) {
     out.field.sky = file.header.sky->mean;
     out.field.sky_slope = static_cast<float>(file.header.sky->slope);
@@ -313,7 +316,7 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
   out.sky = file.sky;
   const auto finite = [](float c) { return std::isfinite(c); };
   if (!std::ranges::all_of(out.transfer.coefficients, finite) || !std::ranges::all_of(out.field.coefficients, finite) ||
-      !std::ranges::all_of(out.field.visibility, finite)) {
+      !std::ranges::all_of(out.field.visibility, finite) || !std::ranges::all_of(out.field.lamp_visibility, finite)) {
     findings.fail("number_out_of_range", "A coefficient does not fit a float.");
   }
   if (!std::ranges::all_of(out.glossy.weights, [](float w) { return std::isfinite(w); }))

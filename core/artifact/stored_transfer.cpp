@@ -170,12 +170,16 @@ std::vector<float> StoredGlossy::pack(std::size_t k, std::span<const std::uint32
 }
 
 StoredField::StoredField(const LightField& field, const Encoding& encoding, std::span<const std::uint32_t> vertices)
-    : shape_(field_shape(field.degree)), visibility_shape_(visibility_shape()) {
+    : shape_(field_shape(field.degree)),
+      visibility_shape_(visibility_shape()),
+      lamp_shape_(lamp_shape(field.lamps.size())) {
   shape_.coefficients = field.coefficients;
   numbers_.emplace(shape_, encoding.field, vertices);
-  if (!field.has_sky()) return;
+  const TransferEncoding seen{.bits = encoding.visibility_bits};
   visibility_shape_.coefficients = field.visibility;
-  visibility_.emplace(visibility_shape_, TransferEncoding{.bits = encoding.visibility_bits}, vertices);
+  lamp_shape_.coefficients = field.lamp_visibility;
+  if (field.has_sky()) visibility_.emplace(visibility_shape_, seen, vertices);
+  if (field.has_lamps()) lamps_.emplace(lamp_shape_, seen, vertices);
 }
 
 }  // namespace kiln

@@ -26,6 +26,7 @@ inline std::string stored_name(const Transfer& shape, std::size_t k) {
 }
 inline std::string field_name(std::size_t k) { return "_SLF_" + std::to_string(k); }
 inline std::string sky_name(std::size_t k) { return "_SLF_SKY_" + std::to_string(k); }
+inline std::string lamp_name(std::size_t k) { return "_SLF_LAMP_" + std::to_string(k); }
 inline std::string glossy_name(std::size_t k) { return "_GLOSSY_" + std::to_string(k); }
 
 inline std::size_t vec4s_of(std::size_t numbers) { return (numbers + 3) / 4; }
@@ -91,8 +92,8 @@ class StoredGlossy {
   std::optional<StoredTransfer> numbers_;
 };
 
-/// r-RFs on their way into a file: stored like transfer vectors of three channels, and what they see of the sky like
-/// such of one.
+/// r-RFs on their way into a file: stored like transfer vectors of three channels, what they see of the sky like such
+/// of one, and what they see of lamps like such of order 0.
 class StoredField {
  public:
   /// `vertices` as above.
@@ -101,14 +102,18 @@ class StoredField {
   const StoredTransfer& numbers() const { return *numbers_; }
   /// Null where no sky is kept apart.
   const StoredTransfer* visibility() const { return visibility_ ? &*visibility_ : nullptr; }
+  /// Null where no lamp is kept apart.
+  const StoredTransfer* lamps() const { return lamps_ ? &*lamps_ : nullptr; }
 
  private:
-  Transfer shape_, visibility_shape_;
-  std::optional<StoredTransfer> numbers_, visibility_;
+  Transfer shape_, visibility_shape_, lamp_shape_;
+  std::optional<StoredTransfer> numbers_, visibility_, lamps_;
 };
 
 /// The shape under which r-RFs of a degree are stored.
 inline Transfer field_shape(int degree) { return {degree + 1, 3, false, {}}; }
 inline Transfer visibility_shape() { return {kVisibilityOrder, 1, false, {}}; }
+/// A channel for each lamp.
+inline Transfer lamp_shape(std::size_t lamps) { return {0, static_cast<int>(lamps), true, {}}; }
 
 }  // namespace kiln

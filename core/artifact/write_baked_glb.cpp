@@ -27,6 +27,17 @@ constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
 json vec(const Vec3f& v) { return {v.x, v.y, v.z}; }
 
+json field_light_json(const Light& light) {
+  constexpr std::array kTypes{"directional", "point", "spot"};
+  json out = {{"type", kTypes[static_cast<std::size_t>(light.type)]}, {"intensity", vec(light.intensity)}};
+  if (light.type != LightType::point) out["direction"] = vec(light.direction);
+  if (light.type == LightType::directional) return out;
+  out["position"] = vec(light.position);
+  out["range"] = light.range;
+  if (light.type == LightType::spot) out["innerConeAngle"] = light.inner_cone, out["outerConeAngle"] = light.outer_cone;
+  return out;
+}
+
 void check_shape(const BakedScene& baked) {
   const Mesh& mesh = baked.scene.mesh;
   EXPECTS(baked.transfer.order >= 0 && baked.transfer.order <= kMaxShOrder);
@@ -46,6 +57,8 @@ void check_shape(const BakedScene& baked) {
           (field.degree <= kMaxLightFieldDegree && field.vertices() == mesh.position.size()));
   EXPECTS(!field.has_sky() ||
           (field.visibility.size() == kVisibilityCount * mesh.position.size() && baked.sky.size() >= 2));
+  EXPECTS(field.lamps.size() <= kMostFieldLamps &&
+          field.lamp_visibility.size() == field.lamps.size() * mesh.position.size());
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -194,6 +207,18 @@ class Writer {
     return out;
   }
 
+  /// The lamps that a field keeps apart, in unit-cube lengths.
+  json lamps_extension() const {
+    json out, lights = json::array();
+    for (const FieldLamp& lamp : baked_.field.lamps) {
+      lights.push_back(field_light_json(lamp.light));
+      lights.back()["mean"] = vec(lamp.mean);
+    }
+    out["lights"] = lights;
+    put_form(out, field_->lamps()->form(), {}, lamp_name);
+    return out;
+  }
+
   std::size_t add_floats(const std::vector<float>& numbers) {
     static_assert(std::endian::native == std::endian::little);
     return add_view({reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size() * sizeof(float)});
@@ -240,12 +265,16 @@ class Writer {
   }
 
   json field_extension() const {
-    json out = {
-        {"version", 1},      {"basis", "real-sh"},           {"condonShortley", false}, {"frame", "world, +Y up"},
-        {"reflected", true}, {"degree", baked_.field.degree}};
+    json out = {{"version", field_->lamps() ? 2 : 1},
+                {"basis", "real-sh"},
+                {"condonShortley", false},
+                {"frame", "world, +Y up"},
+                {"reflected", true},
+                {"degree", baked_.field.degree}};
     put_form(out, field_->numbers().form(), field_components_, field_name);
     out["units"] = "W m^-2 sr^-1";
     if (field_->visibility()) out["sky"] = sky_extension();
+    if (field_->lamps()) out["lamps"] = lamps_extension();
     return out;
   }
 

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "core/artifact/stored_transfer.h"
+#include "core/bake/kept_apart.h"
 #include "core/bake/radiosity_step.h"
-#include "core/bake/sky_apart.h"
 #include "core/lightfield/polynomial_space.h"
 #include "core/trace/surface.h"
 
@@ -126,9 +126,12 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   decide(plan, "degree", std::to_string(f.outgoing.degree), step.degree ? asked : effort.reason);
   decide(plan, "rays of a vertex", std::to_string(f.outgoing.rays),
          (step.rays ? asked : std::string(effort.reason)) + ": one gather serves all eyes");
-  const SkyDecision part = decide_sky(scene, sky, f.outgoing.degree, effort.storage, step.sky);
+  const ApartDecision part = decide_sky(scene, sky, f.outgoing.degree, effort.storage, step.sky);
   f.outgoing.sky_apart = part.apart;
   decide(plan, "sky", part.apart ? "apart" : "in the series", part.reason);
+  const ApartDecision lamps = decide_lamps(scene);
+  f.outgoing.lamps_apart = lamps.apart;
+  decide(plan, "lamps", lamps.apart ? "apart" : "in the series", lamps.reason);
   decide_simplification(plan, recipe);
   add_field_prediction(plan);
   return plan;

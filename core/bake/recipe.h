@@ -100,7 +100,7 @@ struct TransportStep {
   std::optional<int> sender_level;  // the finest level of points that send; auto when absent
 };
 
-/// How a light field holds the sky (sky_apart.h).
+/// How a light field holds the sky (kept_apart.h).
 enum class SkyPart { automatic, apart, series };
 
 /// Radiance towards every eye at the vertices (core/lightfield/outgoing.h), under the light of one job.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/lightfield/lamp_highlights.h"
 #include "core/lightfield/radiance_function.h"
 #include "core/mesh/topology.h"
 
@@ -31,7 +32,10 @@ bool jumps(const std::vector<Vec2f>& uv, const EdgeSides& s) {
 }  // namespace
 
 CollapseCost::CollapseCost(const CollapseMesh& mesh, double geometry_weight, Collapse how, double mean_square)
-    : mesh_(mesh), products_(mesh.lit().field), how_(how) {
+    : mesh_(mesh),
+      products_(mesh.lit().field),
+      how_(how),
+      turned_(double{mesh.lit().field.sky_slope} + lamp_slope(mesh.lit().field.lamps)) {
   const Mesh& m = mesh.mesh();
   const double area = surface_area(m);
   double light = mean_square * area;
@@ -95,8 +99,8 @@ void CollapseCost::update_vertex(std::uint32_t v) {
   const Mesh& mesh = mesh_.mesh();
   products_.of_differences(v, g.ring, normalized(to_double(mesh.normal[v])), g.product);
   for (float& product : g.product) product = static_cast<float>(light_ * double{product});
-  // A mirror that turns shows another part of the sky.
-  add_products(g, v, mesh.normal, light_ * double{mesh_.lit().field.sky_slope});
+  // A mirror that turns shows another part of the sky, and highlights move.
+  add_products(g, v, mesh.normal, light_ * turned_);
   for (const auto* uv : {&mesh.uv0, &mesh.uv1})
     if (!uv->empty()) add_products(g, v, *uv, geometry_ * squared_length_of_unit(g.ring, v, *uv));
 }

@@ -74,6 +74,7 @@ class CollapseCost {
   const CollapseMesh& mesh_;
   FieldProducts products_;
   Collapse how_;
+  double turned_ = 0;                           // what is kept apart changes by that, squared, as normals turn
   double geometry_ = 0, light_ = 0, even_ = 0;  // factors of Q, of E and of area x squared length
   std::vector<Quadric> quadric_;                // of points
   std::vector<double> area_;                    // around points

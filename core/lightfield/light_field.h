@@ -9,7 +9,8 @@
 // Units   W m^-2 sr^-1; w is unit, in world axes, and points away from the surface.
 // Below the horizon of n the series goes on with what it has at the horizon (section 7): the fit sees to it.
 // Where a vertex mirrors the sky more sharply than the series can, the sky's part may be kept apart: then there is
-// `visibility` too, and L~ is the series and what mirrored_sky.h adds.
+// `visibility` too, and L~ is the series and what mirrored_sky.h adds. Punctual lamps are kept apart in the same way:
+// then `lamps` and `lamp_visibility` are there, and lamp_highlights.h adds what surfaces mirror of them.
 // A field of degree 0 may have other channels: any attribute whose distance is Euclid's, like transfer vectors. If it
 // was drawn twice by chance, the first channels are the means of the draws and the last `noise` ones half of their
 // differences.
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "core/base/vec.h"
+#include "core/scene/scene.h"
 #include "core/sphere/sh.h"
 
 namespace kiln {
@@ -31,12 +33,24 @@ inline constexpr int kVisibilityOrder = 3;
 inline constexpr std::size_t kVisibilityCount = sh_count(kVisibilityOrder);
 using SkyVisibility = std::array<float, kVisibilityCount>;
 
+/// A punctual lamp that is kept apart (lamp_highlights.h makes it).
+struct FieldLamp {
+  Light light;                                 // lengths of the unit cube
+  Vec3f mean;                                  // F0 times its irradiance, root mean square: for distances only,
+  std::array<float, kVisibilityCount> lobe{};  // as is what of a highlight distances see, for a mean of 1
+};
+
+/// So many are kept apart at most.
+inline constexpr std::size_t kMostFieldLamps = 8;
+
 struct LightField {
   int degree = 4;                   // bands 0 .. degree, (degree + 1)^2 coefficients of each channel
   std::vector<float> coefficients;  // of one channel after the other, for each vertex
   std::vector<float> visibility;    // of the sky: kVisibilityCount harmonics for each vertex, or empty
   Vec3f sky;                        // what a visibility of 1 adds, in the mean: for distances only,
   float sky_slope = 0;              // and the mean square of how that changes with the normal, RGB, per square radian
+  std::vector<FieldLamp> lamps;     // that are kept apart
+  std::vector<float> lamp_visibility;  // of each of them at each vertex, 0 to 1
   std::size_t channels = 3;
   std::size_t noise = 0;
 
@@ -45,10 +59,11 @@ struct LightField {
   std::size_t vertices() const { return coefficients.size() / row(); }
   std::span<const float> of(std::size_t vertex) const { return {coefficients.data() + row() * vertex, row()}; }
   bool has_sky() const { return !visibility.empty(); }
+  bool has_lamps() const { return !lamps.empty(); }
   std::span<float> of(std::size_t vertex) { return {coefficients.data() + row() * vertex, row()}; }
 };
 
-/// The series of a vertex as distances see it: with the sky's part, as if the sky were even.
+/// The series of a vertex as distances see it: with the sky's part, as if the sky were even, and blurred highlights.
 std::vector<double> mean_light(const LightField&, std::size_t vertex);
 
 /// Calls visit(array, numbers of a vertex) for each array of a field that has something.
@@ -56,6 +71,7 @@ template <class Field, class Visit>
 void each_field_array(Field& field, const Visit& visit) {
   visit(field.coefficients, field.row());
   if (field.has_sky()) visit(field.visibility, kVisibilityCount);
+  if (field.has_lamps()) visit(field.lamp_visibility, field.lamps.size());
 }
 
 /// Calls visit(array of a, array of b, numbers of a vertex) for each array that `b` has.
@@ -63,6 +79,7 @@ template <class FieldA, class FieldB, class Visit>
 void each_field_array_of(FieldA& a, FieldB& b, const Visit& visit) {
   visit(a.coefficients, b.coefficients, b.row());
   if (b.has_sky()) visit(a.visibility, b.visibility, kVisibilityCount);
+  if (b.has_lamps()) visit(a.lamp_visibility, b.lamp_visibility, b.lamps.size());
 }
 
 }  // namespace kiln

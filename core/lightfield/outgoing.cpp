@@ -4,10 +4,13 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <numeric>
 
 #include "core/base/expects.h"
 #include "core/lightfield/hemisphere_norm.h"
+#include "core/lightfield/lamp_highlights.h"
 #include "core/lightfield/lobe_fits.h"
 #include "core/lightfield/mirrored_sky.h"
 #include "core/lightfield/visibility_fit.h"
@@ -16,6 +19,7 @@
 #include "core/prt/ray_origin.h"
 #include "core/prt/transfer_point.h"
 #include "core/trace/ggx.h"
+#include "core/trace/lights.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -42,12 +46,16 @@ VertexMaterial material_at(const Scene& scene, std::uint32_t vertex, std::uint32
           emission_at(scene, p), finish.roughness};
 }
 
+constexpr float kTurnedAway = -1;  // what a vertex sees of a lamp behind its horizon, until that is known
+constexpr std::size_t kNoLamp = static_cast<std::size_t>(-1);
+
 /// What a vertex sees in one direction.
 struct Look {
   Vec3f w, light;
   Vec3f sky;        // the part of the light that is the sky's, or would be if nothing were in the way
   float place = 0;  // which half of its set it belongs to, as IncidentLight::Visit says
   bool even = false, open = false, lamp = false;
+  std::size_t punctual = kNoLamp;  // the number of a punctual lamp
 };
 
 SkyVisibility visibility_of(std::span<const Look> looks, double share) {
@@ -56,6 +64,25 @@ SkyVisibility visibility_of(std::span<const Look> looks, double share) {
     if (!look.lamp) fit.add(look.w, look.even, double{look.sky.x} + double{look.sky.y} + double{look.sky.z}, look.open);
   SkyVisibility out = fit.fit();
   for (float& c : out) c *= static_cast<float>(share);
+  return out;
+}
+
+/// Numbers of the lamps that are brightest at the points, in the mean square; in the order of the scene.
+std::vector<std::size_t> brightest_lamps(const std::vector<Light>& lights, std::span<const TransferPoint> points) {
+  std::vector<double> squares;
+  for (const Light& light : lights) {
+    double sum = 0;
+    for (const TransferPoint& p : points) {
+      const Vec3d e = light_arrival(light, to_double(p.position)).irradiance;
+      sum += dot(e, e);
+    }
+    squares.push_back(sum);
+  }
+  std::vector<std::size_t> out(lights.size());
+  std::iota(out.begin(), out.end(), std::size_t{0});
+  std::ranges::stable_sort(out, std::greater{}, [&](std::size_t k) { return squares[k]; });
+  out.resize(std::min(out.size(), kMostFieldLamps));
+  std::ranges::sort(out);
   return out;
 }
 
@@ -111,7 +138,10 @@ class Gather {
     light_.visit_bright_sky(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place, bool open) {
       out.push_back({.w = w, .light = open ? light : Vec3f{}, .sky = light, .place = place, .open = open});
     });
-    light_.visit_lamps(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place) {
+    light_.visit_punctual(origin, rays, [&](std::size_t lamp, const Vec3f& w, const Vec3f& light) {
+      out.push_back({.w = w, .light = light, .place = -1, .lamp = true, .punctual = lamp});
+    });
+    light_.visit_emitters(origin, item, rays, [&](const Vec3f& w, const Vec3f& light, float place) {
       out.push_back({.w = w, .light = light, .place = place, .lamp = true});
     });
     return out;
@@ -146,9 +176,9 @@ class Gather {
   IncidentLight light_;
 };
 
-/// A vertex that keeps the sky apart.
+/// What a vertex keeps apart.
 struct SharpVertex {
-  double share = 0, alpha = 1;
+  double share = 0, alpha = 1;  // of the sky
   Vec3f f0;
 };
 
@@ -160,8 +190,10 @@ struct VertexResult {
 /// Fits what each vertex sends.
 class VertexBake {
  public:
-  VertexBake(const IncidentLight::World& world, const OutgoingBake& params, Threads& threads)
+  VertexBake(const IncidentLight::World& world, const OutgoingBake& params, std::span<const std::size_t> lamps,
+             Threads& threads)
       : world_(world),
+        lamps_(lamps),
         apart_(params.sky_apart && world.sky != nullptr),
         fits_(params.degree, threads),
         norm_(params.degree),
@@ -176,9 +208,13 @@ class VertexBake {
                     LightField& out, std::uint64_t& rays) const {
     const VertexMaterial material = material_at(world_.tracer.scene(), v, face);
     const LobeFit fit = fits_.at(material.roughness);
-    const std::vector<Look> looks = gather_.looks(point, rays);
+    std::vector<Look> looks = gather_.looks(point, rays);
     const double apart = apart_ ? share_apart(material.roughness) : 0;
     VertexResult result;
+    result.sharp.f0 = material.f0;
+    result.mean += take_lamps(looks, material);
+    for (std::size_t k = 0; k < lamps_.size(); ++k)
+      out.lamp_visibility[lamps_.size() * v + k] = share_seen(world_.tracer.scene().lights[lamps_[k]], point, rays);
     SkyVisibility visibility{};
     if (apart > 0) {
       visibility = visibility_of(looks, apart);
@@ -200,6 +236,29 @@ class VertexBake {
   }
 
  private:
+  /// Takes the lamps that are kept apart out of the looks. Returns the mean of their highlights over eyes and channels.
+  double take_lamps(std::vector<Look>& looks, const VertexMaterial& material) const {
+    double mean = 0;
+    std::erase_if(looks, [&](const Look& look) {
+      if (std::ranges::find(lamps_, look.punctual) == lamps_.end()) return false;
+      // A lobe sends F0 E in all; a half space has 2 pi.
+      mean += double{dot(material.f0, look.light)} / (3 * 2 * std::numbers::pi);
+      return true;
+    });
+    return mean;
+  }
+
+  /// Of a lamp, whatever its cone and range, which are those of the place that an eye sees. kTurnedAway: what is in
+  /// the way is the surface itself.
+  float share_seen(const Light& light, const TransferPoint& point, std::uint64_t& rays) const {
+    const Vec3f origin = ray_origin(point);
+    const LightArrival arrival = light_arrival(light, to_double(origin));
+    if (!(dot(arrival.direction, to_double(point.normal)) > 0)) return kTurnedAway;
+    ++rays;
+    const float far = std::isfinite(arrival.distance) ? static_cast<float>(arrival.distance) : kFar;
+    return world_.tracer.occluded(origin, to_float(arrival.direction), far) ? 0.0F : 1.0F;
+  }
+
   /// The mean of both halves, each of which stands for half of the light; returns the noise of it.
   double mix_halves(const Halves& halves, const VertexMaterial& material, const Vec3f& below,
                     std::span<float> all) const {
@@ -215,6 +274,7 @@ class VertexBake {
   }
 
   const IncidentLight::World& world_;
+  std::span<const std::size_t> lamps_;
   bool apart_;
   LobeFits fits_;
   HemisphereNorm norm_;
@@ -260,6 +320,44 @@ void add_sky(const Environment& sky, std::span<const VertexResult> vertices, Out
   out.field.sky_slope = static_cast<float>(8.0 / 3 * squared_f0 / all * mean_square_slope(level, kTurn));
 }
 
+/// Where a triangle ends that faces a lamp, a vertex may be turned away from it: what such vertices see is what their
+/// neighbours do, and nothing where no neighbour faces the lamp.
+void go_on_behind_the_edge(const Mesh& mesh, std::size_t lamps, std::vector<float>& seen) {
+  std::vector<float> sum(seen.size()), all(seen.size());
+  for (const Triangle& t : mesh.triangles) {
+    for (std::size_t k = 0; k < lamps; ++k) {
+      for (const std::uint32_t from : t) {
+        const float there = seen[lamps * from + k];
+        if (there == kTurnedAway) continue;
+        for (const std::uint32_t to : t) sum[lamps * to + k] += there, all[lamps * to + k] += 1;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if (seen[i] == kTurnedAway) seen[i] = all[i] > 0 ? sum[i] / all[i] : 0;
+}
+
+/// The lamps and what distances need to know of them.
+void add_lamps(const std::vector<Light>& lights, std::span<const std::size_t> lamps,
+               std::span<const TransferPoint> points, std::span<const VertexResult> vertices, LightField& out) {
+  for (std::size_t k = 0; k < lamps.size(); ++k) {
+    const Light& light = lights[lamps[k]];
+    Vec3d squares;
+    double all = 0;
+    for (std::size_t v = 0; v < points.size(); ++v) {
+      const double seen = out.lamp_visibility[lamps.size() * v + k];
+      if (!(seen > 0)) continue;
+      const Vec3d sent =
+          light_arrival(light, to_double(points[v].position)).irradiance * to_double(vertices[v].sharp.f0);
+      squares += sent * sent * seen;
+      all += seen;
+    }
+    if (all > 0) squares = squares / all;
+    out.lamps.push_back(
+        make_field_lamp(light, to_float({std::sqrt(squares.x), std::sqrt(squares.y), std::sqrt(squares.z)})));
+  }
+}
+
 }  // namespace
 
 double share_apart(double roughness) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
@@ -269,14 +367,17 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   const Scene& scene = world.tracer.scene();
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
-  const VertexBake vertex(world, params, threads);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
+  std::vector<std::size_t> lamps;
+  if (params.lamps_apart) lamps = brightest_lamps(scene.lights, points);
+  const VertexBake vertex(world, params, lamps, threads);
   const std::vector<std::uint32_t> order = morton_order_of(points);
   OutgoingLight out;
   out.field.degree = params.degree;
   out.field.coefficients.resize(3 * out.field.count() * points.size());
   if (vertex.sky_apart()) out.field.visibility.resize(kVisibilityCount * points.size());
+  out.field.lamp_visibility.resize(lamps.size() * points.size());
   std::vector<VertexResult> results(points.size());
   std::atomic<std::uint64_t> rays = 0, done = 0;
   threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -292,6 +393,8 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   out.rays = rays;
   out.noise = noise_of(scene.mesh, results);
   if (vertex.sky_apart()) add_sky(*world.sky, results, out, threads);
+  go_on_behind_the_edge(scene.mesh, lamps.size(), out.field.lamp_visibility);
+  add_lamps(scene.lights, lamps, points, results, out.field);
   return out;
 }
 

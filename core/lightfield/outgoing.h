@@ -5,9 +5,10 @@
 // glTF's GGX lobe (core/trace/ggx.h). What arrives is traced once for each vertex and fitted for all eyes
 // (lobe_fits.h): rays even over the half space, and what they would find badly beside them
 // (core/meshless/incident_light.h). Where the sky is kept apart, rays bring what differs from the sky behind what the
-// vertex sees of it. Paper   Vanhoey et al. 2015, whose input was fitted to photographs. Units   W m^-2
-// sr^-1; lengths of the unit cube.   Error  that of the rays (`noise`) and of the fit; unbiased but for the
-//         lit surface that rays look at
+// vertex sees of it; where lamps are kept apart, they bring nothing of these.
+// Paper   Vanhoey et al. 2015, whose input was fitted to photographs.
+// Units   W m^-2 sr^-1; lengths of the unit cube.
+// Error   that of the rays (`noise`) and of the fit; unbiased but for the lit surface that rays look at
 // Cost    vertices x rays closest-hit rays, twice that where a sky has bright parts or the scene emitters
 // Repeat  same bits for any thread count.   Fails  never on a valid Scene; Cancelled if stopped
 
@@ -27,6 +28,8 @@ struct OutgoingBake {
   std::uint64_t seed = 0;
   /// Keeps the sky apart where a vertex is smooth (share_apart, light_field.h, mirrored_sky.h).
   bool sky_apart = false;
+  /// Keeps punctual lamps apart (lamp_highlights.h), the kMostFieldLamps brightest of them, at all vertices.
+  bool lamps_apart = false;
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // vertices
 };
 

@@ -16,12 +16,14 @@ static_assert(std::endian::native == std::endian::little, "the bytes are little 
 static_assert(sizeof(Vec3f) == 12 && sizeof(Vec2f) == 8 && sizeof(Vec4f) == 16 && sizeof(Triangle) == 12);
 
 constexpr std::uint32_t kMagic = 0x4D504B32;  // "2KPM"
-constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16, kHasSky = 32;
+constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16, kHasSky = 32,
+                        kALamp = 64;  // the number of lamps times this is the rest of the word
 
 struct Header {
   std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
                 splits = 0, turned = 0, moved = 0, rank = 0, wide = 0;
 
+  std::size_t lamps() const { return has / kALamp; }
   std::size_t stride() const { return 3 * static_cast<std::size_t>(sh_count(static_cast<int>(degree) + 1)); }
   std::size_t row_floats() const { return rank == 0 ? 0 : (rank + 1) * stride(); }
 };
@@ -67,6 +69,7 @@ void each_array(Progressive& p, AnyStored& stored, const Header& h, const Visit&
     if (h.has & kHasColor) visit(lit.mesh.color, count);
     if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
     if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
+    visit(lit.field.lamp_visibility, count * h.lamps());
     visit(lit.field.coefficients, h.rank == 0 ? count * h.stride() : 0);
     visit(codes.wide, (count * h.wide + 1) / 2 * 2);
     visit(codes.narrow, (count * (h.rank - h.wide) + 3) / 4 * 4);
@@ -233,7 +236,7 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
 std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span<const float> rows, double step) {
   const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
-           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0),
+           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0) | kALamp * size(p.all.field.lamps),
            .base_vertices = p.base_vertices,
            .base_triangles = p.base_triangles,
            .vertices = size(p.all.mesh.position),
@@ -270,7 +273,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   Header h;
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
-  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.has > 63 ||
+  if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.lamps() > kMostFieldLamps ||
       h.rank > h.stride() || h.wide > h.rank)
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
@@ -278,6 +281,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   ProgressiveMesh p;
   p.base_vertices = h.base_vertices, p.base_triangles = h.base_triangles;
   p.all.field.degree = p.moved.field.degree = static_cast<int>(h.degree);
+  p.all.field.lamps.resize(h.lamps()), p.moved.field.lamps.resize(h.lamps());
   Stored stored;
   std::uint64_t size = sizeof h;  // counts are 32 bits, elements below a kilobyte: no overflow
   each_array(p, stored, h, [&](const auto& array, std::size_t count) { size += count * sizeof array[0]; });

@@ -43,7 +43,9 @@ Order order_of(const CollapseRecord& record) {
 }
 
 LitMesh empty_like(const LitMesh& lit) {
-  return {.mesh = {}, .field = {.degree = lit.field.degree, .coefficients = {}, .visibility = {}, .sky = {}}};
+  return {
+      .mesh = {},
+      .field = {.degree = lit.field.degree, .coefficients = {}, .visibility = {}, .sky = {}, .lamps = lit.field.lamps}};
 }
 
 void set_vertex(LitMesh& to, std::uint32_t vertex, const LitMesh& from, std::uint32_t row) {

@@ -14,17 +14,21 @@ Vec3d seen_radiance(const LightField& field, const MirroredSky* sky, const Field
   const std::array<double, 3> weight{1 - at.u - at.v, at.u, at.v};
   Vec3d out;
   SkyVisibility visibility{};
+  std::array<double, kMostFieldLamps> lamps{};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::span<const float> c = field.of(at.triangle[k]);
     for (std::size_t i = 0; i < field.count(); ++i) {
       const double w = weight[k] * y[i];
       out += Vec3d{c[i], c[field.count() + i], c[2 * field.count() + i]} * w;
     }
+    for (std::size_t i = 0; i < field.lamps.size(); ++i)
+      lamps[i] += weight[k] * double{field.lamp_visibility[field.lamps.size() * at.triangle[k] + i]};
     if (!field.has_sky()) continue;
     const float* own = &field.visibility[kVisibilityCount * at.triangle[k]];
     for (std::size_t i = 0; i < kVisibilityCount; ++i) visibility[i] += static_cast<float>(weight[k]) * own[i];
   }
   if (sky != nullptr) out += sky->seen({normal, at.f0, at.roughness}, visibility, seen);
+  if (field.has_lamps()) out += lamp_highlights(field.lamps, lamps, {at.place, normal, seen, at.f0, at.roughness});
   return {std::max(0.0, out.x), std::max(0.0, out.y), std::max(0.0, out.z)};
 }
 

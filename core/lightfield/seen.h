@@ -1,10 +1,12 @@
 #pragma once
 // What an eye sees of a light field between its vertices.
-//   L(p, v) = sum_k alpha_k L~_k(R_n v) + what the sky adds (mirrored_sky.h),   n the interpolated normal          (1)
-// Paper   Vanhoey et al. 2015, equation 8, whose field has no sky of its own.   An eye below the horizon of n counts as
+//   L(p, v) = sum_k alpha_k L~_k(R_n v) + what is kept apart (mirrored_sky.h, lamp_highlights.h)                   (1)
+// n is the interpolated normal.
+// Paper   Vanhoey et al. 2015, equation 8, who keep nothing apart.   An eye below the horizon of n counts as
 // at it (section 7); what the series leaves below 0 counts as 0.
 
 #include "core/base/vec.h"
+#include "core/lightfield/lamp_highlights.h"
 #include "core/lightfield/light_field.h"
 #include "core/lightfield/mirrored_sky.h"
 #include "core/mesh/mesh.h"
@@ -15,11 +17,12 @@ struct FieldPoint {
   const Triangle& triangle;
   double u = 0, v = 0;  // barycentrics of corners 1 and 2
   Vec3d normal, view;   // unit; the view points to the eye
-  Vec3d f0;             // of the surface's specular lobe, and its roughness: for what the sky adds
+  Vec3d f0;             // of the surface's specular lobe, and its roughness: for what is kept apart
   double roughness = 1;
+  Vec3d place;  // for lamps
 };
 
-/// The series alone, or with the sky: `sky` is null where the field has no visibility.
+/// `sky` is null where the field has no visibility of it.
 Vec3d seen_radiance(const LightField&, const MirroredSky* sky, const FieldPoint&);
 
 }  // namespace kiln

@@ -26,8 +26,10 @@ class Simplifier {
         reach_(mesh_, params.max_reach),
         age_(mesh_.points(), 0) {
     if (params.record)
-      out_.record.before = {.mesh = {},
-                            .field = {.degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}}};
+      out_.record.before = {
+          .mesh = {},
+          .field = {
+              .degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}, .lamps = lit_.field.lamps}};
   }
 
   SimplifyResult run() {

@@ -61,16 +61,11 @@ IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random&
 
 void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                  const Visit& visit) const {
-  visit_lamps(place, item, rays, visit);
+  visit_punctual(place, rays, [&](std::size_t, const Vec3f& w, const Vec3f& light) { visit(w, light, -1); });
+  visit_emitters(place, item, rays, visit);
   visit_bright_sky(place, item, rays, [&](const Vec3f& w, const Vec3f& light, float at, bool seen) {
     if (seen) visit(w, light, at);
   });
-}
-
-void IncidentLight::visit_lamps(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit& visit) const {
-  if (!own_.direct) return;
-  visit_punctual(place, rays, visit);
-  visit_emitters(place, item, rays, visit);
 }
 
 Vec3f IncidentLight::balanced_sky(const Vec3f& w) const {
@@ -92,14 +87,15 @@ Vec3f IncidentLight::seen_emitter(const Hit& hit, const Vec3f& w) const {
   return emission_at(world_.tracer.scene(), p) * static_cast<float>(own_.density / (own_.density + other));
 }
 
-void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit& visit) const {
-  for (const Light& light : world_.tracer.scene().lights) {
-    const LightArrival arrival = light_arrival(light, to_double(place));
+void IncidentLight::visit_punctual(const Vec3f& place, std::uint64_t& rays, const LampVisit& visit) const {
+  const std::vector<Light>& lights = world_.tracer.scene().lights;
+  for (std::size_t k = 0; own_.direct && k < lights.size(); ++k) {
+    const LightArrival arrival = light_arrival(lights[k], to_double(place));
     if (arrival.irradiance == Vec3d{}) continue;
     ++rays;
     const Vec3f w = to_float(arrival.direction);
     const float far = std::isfinite(arrival.distance) ? static_cast<float>(arrival.distance) : kFar;
-    if (!world_.tracer.occluded(place, w, far)) visit(w, to_float(arrival.irradiance), -1);
+    if (!world_.tracer.occluded(place, w, far)) visit(k, w, to_float(arrival.irradiance));
   }
 }
 
@@ -127,7 +123,7 @@ void IncidentLight::visit_bright_sky(const Vec3f& place, std::uint64_t item, std
 
 void IncidentLight::visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                    const Visit& visit) const {
-  if (emitters_.empty()) return;
+  if (!own_.direct || emitters_.empty()) return;
   Random random(seed_, item, 3);
   for (int k = 0; k < own_.count; ++k) {
     const double pick = (k + random.uniform_double()) / own_.count;

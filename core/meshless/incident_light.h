@@ -58,8 +58,11 @@ class IncidentLight {
   /// Visits the lamps' and the bright sky's light at a place, `item` of which names its random numbers. Nothing
   /// without `direct`. Adds to `rays`.
   void visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
-  /// The same in two parts, where that of the sky is visited whether it is seen or not.
-  void visit_lamps(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
+  /// The same in three parts, where punctual lights have their number in the scene, and the sky is visited whether it
+  /// is seen or not.
+  using LampVisit = std::function<void(std::size_t lamp, const Vec3f& w, const Vec3f& light)>;
+  void visit_punctual(const Vec3f& place, std::uint64_t& rays, const LampVisit&) const;
+  void visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
   using SkyVisit = std::function<void(const Vec3f& w, const Vec3f& light, float place, bool seen)>;
   void visit_bright_sky(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const SkyVisit&) const;
 
@@ -73,8 +76,6 @@ class IncidentLight {
   Environment blurred_sky() const;
   void draw_bright_rays();
   Vec3f seen_emitter(const Hit&, const Vec3f& w) const;
-  void visit_punctual(const Vec3f& place, std::uint64_t& rays, const Visit&) const;
-  void visit_emitters(const Vec3f& place, std::uint64_t item, std::uint64_t& rays, const Visit&) const;
 
   float place_of(int sample) const { return static_cast<float>(sample) / static_cast<float>(own_.count); }
 

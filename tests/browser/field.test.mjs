@@ -2,7 +2,7 @@
 //
 // fixtures/field.glb is a ball of metal over a floor, degree 4; lod1.glb and lod2.glb are the same with fewer vertices.
 // field.csv is what kiln eval says that eyes see of it; sky.glb and sky.csv are alike, and keep the sky apart
-// (fixtures/make_field.sh).
+// (fixtures/make_field.sh); so are lamps.glb and lamps.csv, with three lamps kept apart besides.
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -19,7 +19,7 @@ const reader = await load('asset/light_field.ts');
 const { MirroredSky, colourOf } = await load('asset/mirrored_sky.ts');
 const { fieldCount, halfAt, halfOf, numberOfHalf, readLightField, seenRadiance, texelsOf } = reader;
 const fixture = (name) => readFileSync(new URL(`fixtures/${name}`, import.meta.url));
-const [file, skyFile] = [fixture('field.glb'), fixture('sky.glb')];
+const [file, skyFile, lampFile] = ['field.glb', 'sky.glb', 'lamps.glb'].map(fixture);
 const draco = await fromViewer('draco3dgltf').createDecoderModule({});
 const bytesOf = (buffer) => buffer.buffer.slice(buffer.byteOffset, buffer.byteOffset + buffer.byteLength);
 const kHalfStep = 2 ** -11; // rounding to half floats, relative
@@ -67,7 +67,7 @@ test('every coefficient has a half of its own, and no texel is left over', () =>
     for (let c = 0; c < 3; ++c) for (let i = 0; i < fieldCount(degree); ++i) places.add(halfAt(degree, i, c));
     assert.equal(places.size, 3 * fieldCount(degree));
     assert.equal(Math.max(...places), places.size - 1);
-    assert.equal(texelsOf({ degree, sky: false }), Math.ceil(places.size / 8));
+    assert.equal(texelsOf({ degree, sky: false, lamps: 0 }), Math.ceil(places.size / 8));
   }
 });
 
@@ -107,34 +107,37 @@ function triangleAt(parts, place) {
 }
 
 /// Base colour and finish of a part of the fixtures, which have no textures.
-function mirrorOf(json, part, sky) {
-  if (!sky) return undefined;
+function mirrorOf(json, part, { sky, lamps }) {
+  if (!sky && lamps.length === 0) return undefined;
   const { baseColorFactor, metallicFactor, roughnessFactor } = json.materials[part].pbrMetallicRoughness;
   const f0 = baseColorFactor.slice(0, 3).map((c) => 0.04 * (1 - metallicFactor) + c * metallicFactor);
-  return { sky: new MirroredSky(sky), f0, roughness: roughnessFactor };
+  return { sky: sky && new MirroredSky(sky), lamps, f0, roughness: roughnessFactor };
 }
 
-for (const name of ['field', 'sky'])
+for (const name of ['field', 'sky', 'lamps'])
   test(`what an eye sees between three vertices is what kiln says: ${name}`, () => {
-    const { baked, sky } = unpack(draco, readPacked(bytesOf(fixture(`${name}.glb`))));
-    assert.equal(sky !== null, name === 'sky');
+    const { baked, sky, lamps } = unpack(draco, readPacked(bytesOf(fixture(`${name}.glb`))));
+    assert.equal(sky !== null, name !== 'field');
+    assert.deepEqual(lamps.map(({ type }) => type), name === 'lamps' ? ['point', 'spot', 'directional'] : []);
     const [names, ...lines] = fixture(`${name}.csv`).toString().trim().split('\n');
     assert.match(names, /^x,y,z,nx,ny,nz,vx,vy,vz,.*,radiance_r,radiance_g,radiance_b,distance$/);
     const rows = lines.map((line) => line.split(',').map(Number));
     const { json } = glbJson(fixture(`${name}.glb`));
-    const mirrors = baked.map((_, i) => mirrorOf(json, json.meshes[1].primitives[i].material, sky));
+    const mirrors = baked.map((_, i) => mirrorOf(json, json.meshes[1].primitives[i].material, { sky, lamps }));
     const { scale, translation } = json.nodes[json.scenes[0].nodes[0]];
-    let [below, mirrored] = [0, 0];
+    let [below, mirrored, highlights] = [0, 0, 0];
     for (const row of rows) {
       const [place, view, expected] = [row.slice(0, 3), row.slice(6, 9), row.slice(12, 15)];
       const inCube = place.map((x, a) => (x - translation[a]) / scale[a]);
       const { part, corners, weights } = triangleAt(baked, inCube);
-      const mirror = mirrors[baked.indexOf(part)];
+      const mirror = mirrors[baked.indexOf(part)] && { ...mirrors[baked.indexOf(part)], place: inCube };
       const normal = unit(mean(part.normals, corners, weights));
       if (dot(normal, view) < 0) ++below;
       const bound = rounding(part.field, corners, weights, normal, view);
       const alone = seenRadiance(part.field, corners, weights, normal, view);
+      const dark = mirror && seenRadiance(part.field, corners, weights, normal, view, { ...mirror, lamps: [] });
       seenRadiance(part.field, corners, weights, normal, view, mirror).forEach((x, c) => {
+        if (mirror && x > 1.1 * dark[c]) ++highlights;
         // and kiln looks the place up in floats: 2^-24 of the cube beside it, 1e-5 of a triangle; visibility is in halves
         const most = bound[c] + 1e-5 * (1 + x) + (mirror ? 8 * kHalfStep * x : 0);
         assert.ok(Math.abs(x - expected[c]) <= most, `${x} is not ${expected[c]} within ${most}`);
@@ -142,7 +145,8 @@ for (const name of ['field', 'sky'])
       });
     }
     assert.ok(rows.length >= 80 && below >= 20, 'too few rows, or no eye below a horizon');
-    assert.equal(mirrored > 20, name === 'sky', 'the sky is not in what is seen');
+    assert.equal(mirrored > 20, name !== 'field', 'the sky is not in what is seen');
+    assert.equal(highlights > 20, name === 'lamps', 'no lamp is in what is seen');
   });
 
 test('shared exponents are what they stand for', () => {
@@ -179,13 +183,13 @@ test('of components mean and weighted rows are added', () => {
         const term = (e.offset[k] + e.scale[k] * stored[k >> 2][4 * v + (k & 3)]) * rows[(k + 1) * slots + s];
         [sum, size] = [sum + term, size + Math.abs(term)];
       }
-      const found = unit * numberOfHalf(halves[8 * texelsOf({ degree, sky: false }) * v + halfAt(degree, s % 9, Math.floor(s / 9))]);
+      const found = unit * numberOfHalf(halves[8 * texelsOf({ degree, sky: false, lamps: 0 }) * v + halfAt(degree, s % 9, Math.floor(s / 9))]);
       assert.ok(Math.abs(found - sum) <= kHalfStep * Math.abs(sum) + 1e-6 * size, `${found} is not ${sum}`);
     }
 });
 
 const kFaults = {
-  version: (e) => (e.version = 2),
+  version: (e) => (e.version = 3),
   basis: (e) => (e.condonShortley = true),
   reflected: (e) => delete e.reflected,
   degree: (e) => (e.degree = 9),
@@ -212,6 +216,31 @@ for (const [member, spoil] of Object.entries(kSkyFaults))
     const e = skyExtension();
     spoil(e.sky);
     const place = new RegExp(`^Error: /extensions/KILN_light_field/sky/${member}: `);
+    assert.throws(() => readLightField({ extensions: { KILN_light_field: e } }), place);
+  });
+
+const lampExtension = () => structuredClone(glbJson(lampFile).json.extensions.KILN_light_field);
+const kLampFaults = {
+  form: (lamps) => (lamps.form = 'components'),
+  attributes: (lamps) => (lamps.attributes = ['_SLF_LAMP_1']),
+  scale: (lamps) => lamps.scale.pop(),
+  offset: (lamps) => (lamps.offset[2] = null),
+  lights: (lamps) => (lamps.lights = []),
+  'lights/0/type': (lamps) => (lamps.lights[0].type = 'area'),
+  'lights/0/intensity': (lamps) => (lamps.lights[0].intensity = [1, -1, 1]),
+  'lights/0/range': (lamps) => (lamps.lights[0].range = -1),
+  'lights/1/position': (lamps) => lamps.lights[1].position.pop(),
+  'lights/1/outerConeAngle': (lamps) => (lamps.lights[1].outerConeAngle = 2),
+  'lights/1/innerConeAngle': (lamps) => delete lamps.lights[1].innerConeAngle,
+  'lights/2/direction': (lamps) => (lamps.lights[2].direction = [0, 0, 0]),
+};
+
+for (const [member, spoil] of Object.entries(kLampFaults))
+  test(`a wrong ${member} of lamps is refused by its JSON pointer`, () => {
+    const e = lampExtension();
+    assert.equal(e.version, 2);
+    spoil(e.lamps);
+    const place = new RegExp(`^Error: /extensions/KILN_light_field/lamps/${member}: `);
     assert.throws(() => readLightField({ extensions: { KILN_light_field: e } }), place);
   });
 
@@ -250,11 +279,12 @@ const kReport = {
   },
 };
 
-let browser, mock, skyMock;
+let browser, mock, skyMock, lampMock;
 before(async () => {
   browser = await startBrowser();
   mock = await startMock({ files: { 'scene.glb': file, 'report.json': Buffer.from(JSON.stringify(kReport)) } });
   skyMock = await startMock({ files: { 'scene.glb': skyFile } });
+  lampMock = await startMock({ files: { 'scene.glb': lampFile } });
   const { artifacts } = mock.jobs.get(jobId('done'));
   for (const name of ['lod2.glb', 'lod1.glb']) artifacts.push({ ...artifacts[0], name, bytes: fixture(name).length });
 });
@@ -262,11 +292,12 @@ after(async () => {
   await browser.close();
   await mock.close();
   await skyMock.close();
+  await lampMock.close();
 });
 
 const address = (hash) => `${mock.url}/view/${jobId('done')}#${hash}`;
 const withField = (hash, act) => withReady(browser, address(hash), act);
-const withSky = (hash, act) => withReady(browser, `${skyMock.url}/view/${jobId('done')}#${hash}`, act);
+const withApart = (from, hash, act) => withReady(browser, `${from.url}/view/${jobId('done')}#${hash}`, act);
 
 /// Pixels well inside triangles of the ball that face the eye: their colour, and what the reader says is seen there, at
 /// the pixel and at the corners of its triangle.
@@ -345,16 +376,41 @@ test('a pixel is what the reader sees there, from wherever one looks, and highli
 // Levels of the sky are brought to one resolution on the graphics card, in half floats.
 const kSkySteps = 3 / 255;
 
-test('so is one that mirrors the sky, at pixels and at vertices, and with every level in one file', () =>
-  withSky('tone=none&ev=-2&background=off', async (page) => {
-    for (const pose of kPoses) {
-      const { seen, exposure } = await look(page, pose);
-      assert.ok(seen.length > 20);
-      for (const { colour, expected } of seen) near(colour, display(expected, exposure), kSkySteps);
-    }
-    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'vertices' }));
-    const { seen, exposure } = await look(page, kPoses[0]);
-    for (const one of seen) near(one.colour, display(between(one), exposure), kSkySteps);
+for (const what of ['the sky', 'the sky and lamps'])
+  test(`so is one that mirrors ${what}, at pixels and at vertices, and with every level in one file`, () =>
+    withApart(what === 'the sky' ? skyMock : lampMock, 'tone=none&ev=-2&background=off', async (page) => {
+      for (const pose of kPoses) {
+        const { seen, exposure } = await look(page, pose);
+        assert.ok(seen.length > 20);
+        for (const { colour, expected } of seen) near(colour, display(expected, exposure), kSkySteps);
+      }
+      await page.evaluate(() => window.kilnViewer.state.set({ mode: 'vertices' }));
+      const { seen, exposure } = await look(page, kPoses[0]);
+      for (const one of seen) near(one.colour, display(between(one), exposure), kSkySteps);
+    }));
+
+test('a progressive mesh at its finest mirrors the lamps as the file itself does', () =>
+  withApart(lampMock, 'tone=none&ev=-2&background=off', async (page) => {
+    const picture = (detail) =>
+      page.evaluate(async (detail) => {
+        const { stage, state } = window.kilnViewer;
+        stage.pose = [0.9, 0.84, 1.8, 0, 0.3, 0];
+        state.set({ detail });
+        stage.drawNow();
+        const gl = stage.renderer.getContext();
+        const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const pixels = new Uint8Array(4 * width * height);
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        return [...pixels];
+      }, detail);
+    const [own, finest] = [await picture(1), await picture(0.999999)];
+    let [off, bright] = [0, 0];
+    own.forEach((x, i) => {
+      off += Math.abs(x - finest[i]) / own.length;
+      bright += x > 200 && i % 4 < 3 ? 1 : 0;
+    });
+    assert.ok(bright > 100, 'there is no highlight');
+    assert.ok(off < 1, `${off} of 255 off in the mean`); // positions, normals and light are rounded in one only
   }));
 
 const between = ({ corners, weights }) =>
@@ -457,7 +513,7 @@ test('the panel tells degree, bytes, and what the report certifies', () =>
     await page.getByText('Statistics').click();
     const text = await page.locator('.statistics').innerText();
     assert.match(text, /4: 25 × RGB a vertex/);
-    const total = (await vertices(page)) * 16 * texelsOf({ degree: 4, sky: false });
+    const total = (await vertices(page)) * 16 * texelsOf({ degree: 4, sky: false, lamps: 0 });
     assert.match(text, new RegExp(`On the graphics card\\s+${(total / 1000).toPrecision(3)} kB`));
     assert.match(text, /towards random eyes\s+5\.0\u00a0% \(95\u00a0%: 4\.5\u00a0% to 6\.0\u00a0%\)/);
     assert.match(text, /1,013 points, 64 paths each/);

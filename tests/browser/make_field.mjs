@@ -1,5 +1,5 @@
-// node make_field.mjs OUT.glb: a small ball of brushed metal over a floor, for the fixtures of light fields
-// (fixtures/make_field.sh).
+// node make_field.mjs OUT.glb [lamps]: a small ball of brushed metal over a floor, for the fixtures of light fields
+// (fixtures/make_field.sh); with lamps a point, a spot and a sun above it.
 
 import { writeFileSync } from 'node:fs';
 
@@ -58,6 +58,22 @@ const json = {
   bufferViews: views,
   buffers: [{ byteLength: length }],
 };
+if (process.argv[3] === 'lamps') {
+  const down = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2]; // a quarter turn about x: -z becomes -y
+  const tilted = [-0.5, -0.3, 0.1, 0.8].map((x) => x / Math.hypot(0.5, 0.3, 0.1, 0.8));
+  const lights = [
+    { type: 'point', color: [1, 0.8, 0.5], intensity: 6, range: 4 },
+    { type: 'spot', color: [0.4, 0.7, 1], intensity: 8, spot: { innerConeAngle: 0.3, outerConeAngle: 0.5 } },
+    { type: 'directional', intensity: 1 },
+  ];
+  const places = [{ translation: [1, 1.8, 1.1] }, { translation: [0, 2.4, 0], rotation: down }, { rotation: tilted }];
+  json.extensionsUsed = ['KHR_lights_punctual'];
+  json.extensions = { KHR_lights_punctual: { lights } };
+  places.forEach((place, light) => {
+    json.scenes[0].nodes.push(json.nodes.length);
+    json.nodes.push({ ...place, extensions: { KHR_lights_punctual: { light } } });
+  });
+}
 const text = Buffer.from(JSON.stringify(json));
 const padded = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]);
 const binary = Buffer.concat(pieces);

@@ -131,6 +131,23 @@ TEST_F(Light, ABakedMetalShowsEyesWhatTheReferenceSays) {
   EXPECT_EQ(run_kiln({"points", metal, "--specular"}).exit, 2) << "a scene has no matrices";
 }
 
+TEST_F(Light, ALightFieldThatMissesItsTargetIsDeliveredAndEndsWithEight) {
+  const std::string metal = folder.write("metal.gltf", finished("1", "0.5"));
+  const auto bake = [&](const std::string& quality) {
+    const std::string recipe = folder.write(
+        "recipe.json", R"({"environment":{"builtin":"overcast"},"quality":)" + quality +
+                           R"(,"steps":[{"do":"lightfield","degree":2,"rays":64,"subdivide":"off","sky":"series"}]})");
+    return run_kiln({"bake", metal, "-r", recipe, "-o", folder.path("out")});
+  };
+  const Ran missed = bake(R"({"target_error":0.001})");
+  EXPECT_EQ(missed.exit, 8) << missed.err;
+  EXPECT_NE(missed.err.find("/steps/0/"), std::string::npos) << "the knob that hinders: " << missed.err;
+  EXPECT_NE(missed.out.find("scene.glb"), std::string::npos);
+  EXPECT_EQ(run_kiln({"inspect", folder.path("out/scene.glb")}).exit, 0);
+  const Ran met = bake(R"({"target_error":0.5})");
+  EXPECT_EQ(met.exit, 0) << met.err;
+}
+
 TEST_F(Light, TheReferenceIsLinearInItsLight) {
   const ValueTable truth = values(
       {"reference", scene, "--points", draw(scene, 5), "--env", "0.5,1,4", "--intensity", "2", "--samples", "16"});

@@ -74,7 +74,7 @@ TEST(LightFieldGlb, WhatIsNotRightIsRefusedByName) {
   EXPECT_EQ(code("\"degree\":2", "\"degree\":-1"), "json_type");
   EXPECT_EQ(code("\"reflected\":true", "\"reflected\":false"), "not_a_baked_scene");
   EXPECT_EQ(code("\"_SLF_0\",\"_SLF_1\"", "\"_SLF_1\",\"_SLF_0\""), "slot_count_mismatch");
-  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":2"), "unsupported_version");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":3"), "unsupported_version");
 }
 
 SkyLevels random_sky(float brightest) {
@@ -146,6 +146,76 @@ TEST(LightFieldGlb, ASkyThatIsNotRightIsRefusedByName) {
   EXPECT_EQ(code("\"slope\":3.0", "\"slope\":-3.0"), "number_out_of_range");
   EXPECT_EQ(code("\"rows\":16", "\"rows\":15"), "slot_count_mismatch");
   EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[0.5,1.0]"), "slot_count_mismatch");
+}
+
+BakedScene with_lamps() {
+  BakedScene out = with_field(2);
+  Light light{.type = LightType::directional, .name = {}, .intensity = {1, 2, 3}};
+  light.direction = normalized(Vec3f{1, -2, 3});
+  out.field.lamps.push_back(make_field_lamp(light, {0.5F, 1, 2}));
+  light.type = LightType::point, light.position = {0.25F, 0.5F, -0.75F}, light.range = 3;
+  out.field.lamps.push_back(make_field_lamp(light, {1, 1, 1}));
+  light.type = LightType::spot, light.inner_cone = 0.25F, light.outer_cone = 0.5F;
+  for (int k = 0; k < 3; ++k) out.field.lamps.push_back(make_field_lamp(light, {1, 1, 1}));
+  Random random(13, 0);
+  const std::size_t numbers = out.field.lamps.size() * out.scene.mesh.position.size();
+  for (std::size_t i = 0; i < numbers; ++i) out.field.lamp_visibility.push_back(random.uniform());
+  return out;
+}
+
+TEST(LightFieldGlb, LampsThatAreKeptApartTravelWithTheField) {
+  const BakedScene written = with_lamps(), read = round_trip(written);
+  const std::size_t count = written.field.lamps.size();
+  ASSERT_EQ(read.field.lamps.size(), count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const FieldLamp &a = written.field.lamps[k], &b = read.field.lamps[k];
+    EXPECT_EQ(a.light.type, b.light.type);
+    EXPECT_EQ(a.light.intensity, b.light.intensity);
+    EXPECT_EQ(a.mean, b.mean);
+    const bool distant = a.light.type == LightType::directional;
+    if (a.light.type != LightType::point) EXPECT_EQ(a.light.direction, b.light.direction);
+    if (!distant) EXPECT_EQ(a.light.position, b.light.position);
+    if (!distant) EXPECT_EQ(a.light.range, b.light.range);
+    if (a.light.type == LightType::spot) EXPECT_EQ(a.light.outer_cone, b.light.outer_cone);
+    if (a.light.type == LightType::spot) EXPECT_EQ(a.light.inner_cone, b.light.inner_cone);
+    if (a.light.type != LightType::point) EXPECT_EQ(a.lobe, b.lobe);
+  }
+  const auto original = original_vertices(read);
+  double worst = 0;
+  for (std::size_t v = 0; v < read.field.vertices(); ++v) {
+    for (std::size_t k = 0; k < count; ++k)
+      worst = std::max<double>(worst, std::abs(read.field.lamp_visibility[count * v + k] -
+                                               written.field.lamp_visibility[count * original[v] + k]));
+  }
+  EXPECT_LE(worst, 1.001 * 0.5 / 1023);  // ten bits over a range of at most 1: half a step
+  EXPECT_GT(worst, 0.2 * 0.5 / 1023);
+}
+
+TEST(LightFieldGlb, AFileSaysTheVersionThatItNeeds) {
+  const auto version = [](const BakedScene& scene) {
+    const Bytes file = *write_baked_glb(scene);
+    const std::string json(split_glb(file)->json), name = "\"KILN_light_field\":{\"version\":";
+    return json.at(json.find(name) + name.size());
+  };
+  EXPECT_EQ(version(with_field(2)), '1');
+  EXPECT_EQ(version(with_sky()), '1');  // readers of before know it
+  EXPECT_EQ(version(with_lamps()), '2');
+}
+
+TEST(LightFieldGlb, LampsThatAreNotRightAreRefusedByName) {
+  const Bytes file = *write_baked_glb(with_lamps());
+  const auto code = [&](const std::string& from, const std::string& to) { return code_of(file, from, to); };
+  EXPECT_EQ(code("\"type\":\"spot\"", "\"type\":\"area\""), "not_a_baked_scene");
+  EXPECT_EQ(code("\"intensity\":[1.0,2.0,3.0]", "\"intensity\":[1.0,-2.0,3.0]"), "number_out_of_range");
+  EXPECT_EQ(code("\"intensity\":[1.0,2.0,3.0]", "\"intensity\":[1.0,2.0]"), "json_type");
+  EXPECT_EQ(code("\"range\":3.0", "\"range\":-3.0"), "number_out_of_range");
+  EXPECT_EQ(code("\"outerConeAngle\":0.5", "\"outerConeAngle\":2"), "number_out_of_range");
+  EXPECT_EQ(code("\"innerConeAngle\":0.25", "\"innerConeAngle\":0.75"), "number_out_of_range");
+  EXPECT_EQ(code("\"direction\":[", "\"direction\":[5,0,0],\"other\":["), "number_out_of_range");
+  EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[-1,1.0,2.0]"), "number_out_of_range");
+  EXPECT_EQ(code("\"_SLF_LAMP_0\",\"_SLF_LAMP_1\"", "\"_SLF_LAMP_1\",\"_SLF_LAMP_0\""), "slot_count_mismatch");
+  EXPECT_EQ(code("\"lights\":[{", "\"lights\":[],\"others\":[{"), "number_out_of_range");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":2", "\"KILN_light_field\":{\"version\":3"), "unsupported_version");
 }
 
 TEST(LightFieldGlb, AProgressiveMeshTravelsWithTheScene) {

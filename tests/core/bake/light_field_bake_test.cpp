@@ -8,8 +8,8 @@
 #include "core/artifact/baked_scene.h"
 #include "core/artifact/progressive_glb.h"
 #include "core/bake/field_eye.h"
+#include "core/bake/kept_apart.h"
 #include "core/bake/light_field_levels.h"
-#include "core/bake/sky_apart.h"
 #include "core/lightfield/polynomial_space.h"
 #include "tests/core/bake/bake_input.h"
 

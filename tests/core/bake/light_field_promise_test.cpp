@@ -81,6 +81,19 @@ TEST(LightFieldPromise, ABudgetTooShortForOnePassStillGivesAWholeArtefact) {
   EXPECT_EQ(promise["passes"].size(), 1U);
 }
 
+TEST(LightFieldPromise, OfATargetAndATimeTheOneThatComesFirstEndsIt) {
+  const json soon = report_of(baked(brushed(R"({"target_error":0.005,"time_budget_s":0.01})")))["promise"];
+  EXPECT_EQ(soon["ended_by"], "time_spent") << soon;
+  EXPECT_EQ(soon["passes"].size(), 1U);
+  EXPECT_GT(soon["passes"][0]["interval"][1].get<double>(), 0.005);
+  EXPECT_EQ(soon["target_error"], 0.005);
+  EXPECT_EQ(soon["time_budget_s"], 0.01);
+  const json easy = report_of(baked(brushed(R"({"target_error":0.6,"time_budget_s":600})")))["promise"];
+  EXPECT_EQ(easy["ended_by"], "target_met") << easy;
+  EXPECT_TRUE(easy["kept"].get<bool>());
+  EXPECT_LE(easy["passes"].back()["interval"][1].get<double>(), 0.6);
+}
+
 /// A pass of degree 4 and 256 rays, as the loop sees it.
 Plan next_after(const ErrorSources& sources) {
   PassRecord pass;

@@ -153,7 +153,8 @@ TEST(Outgoing, RoughSurfacesKeepNoSkyApart) {
 }
 
 TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
-  const Scene scene = ball_and_wall(0.5F);
+  Scene scene = ball_and_wall(0.5F);
+  scene.lights.push_back({.type = LightType::point, .name = {}, .intensity = {1, 1, 1}, .position = {0.3F, 0.3F, 0}});
   const Environment sky = overcast_sky();
   std::vector<float> first;
   for (const int count : {1, 3}) {
@@ -162,8 +163,12 @@ TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
     const std::vector<Vec3f> value(scene.mesh.position.size(), {0.5F, 0.5F, 0.5F});
     const GatherFaces faces(scene);
     const OutgoingLight made =
-        bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128, .sky_apart = true}, threads);
+        bake_outgoing({tracer, faces, nullptr, &sky}, value,
+                      {.degree = 3, .rays = 128, .sky_apart = true, .lamps_apart = true}, threads);
+    ASSERT_TRUE(made.field.has_lamps());
     std::vector<float> numbers = made.field.coefficients;
+    numbers.insert(numbers.end(), made.field.lamp_visibility.begin(), made.field.lamp_visibility.end());
+    numbers.push_back(made.field.lamps[0].mean.x);
     numbers.insert(numbers.end(), made.field.visibility.begin(), made.field.visibility.end());
     if (first.empty()) first = numbers;
     EXPECT_EQ(first, numbers);

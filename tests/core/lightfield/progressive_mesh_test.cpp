@@ -129,6 +129,31 @@ TEST_P(Progressive, BytesComeBackAsTheyWere) {
   EXPECT_EQ(soup(at_level(*back, p.levels() / 2)), soup(at_level(p, p.levels() / 2)));
 }
 
+TEST_P(Progressive, WhatIsSeenOfLampsComesBackToo) {
+  LitMesh lit = sample(12);
+  lit.field.lamps.resize(3);
+  for (std::size_t v = 0; v < lit.mesh.position.size(); ++v)
+    for (int k = 0; k < 3; ++k)
+      lit.field.lamp_visibility.push_back(0.5F + 0.5F * std::sin(static_cast<float>(k + 5) * lit.mesh.position[v].y));
+  const ProgressiveMesh p = progressive_mesh(recorded(lit, GetParam()).record);
+  const auto back = decode_progressive(encode_progressive(p));
+  ASSERT_TRUE(back);
+  ASSERT_EQ(back->all.field.lamps.size(), 3U);
+  EXPECT_EQ(back->all.field.lamp_visibility, p.all.field.lamp_visibility);
+  const LitMesh finest = at_level(*back, p.levels() - 1);
+  ASSERT_EQ(finest.field.lamp_visibility.size(), 3 * finest.mesh.position.size());
+  for (std::size_t v = 0; v < finest.mesh.position.size(); ++v)  // each with its own vertex
+    EXPECT_FLOAT_EQ(finest.field.lamp_visibility[3 * v], 0.5F + 0.5F * std::sin(5 * finest.mesh.position[v].y));
+}
+
+TEST(ProgressiveMesh, MoreLampsThanThereMayBeAreAFault) {
+  auto bytes = encode_progressive(progressive_mesh(recorded(sample(4), Collapse::edge, 10).record));
+  bytes[9] |= 4;  // bit 10 of the attributes: 16 lamps
+  const auto out = decode_progressive(bytes);
+  ASSERT_FALSE(out);
+  EXPECT_EQ(out.error().code, "unsupported_version");
+}
+
 TEST(ProgressiveMesh, WithoutACollapseItIsTheInput) {
   const LitMesh lit = sample(4);
   const ProgressiveMesh p = progressive_mesh(recorded(lit, Collapse::edge, 1000).record);

@@ -3,16 +3,17 @@
 // k: the corners of a triangle, n: the interpolated normal, w: the way to the eye, raised to the horizon of n where it
 // is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
 //
-// Where the file keeps the sky apart (mirrored_sky.ts), what the sky adds belongs to the sum. That a vertex sees of it is
-// interpolated too.
+// Where the file keeps the sky apart (mirrored_sky.ts) or lamps (field_lamps.ts), what they add belongs to the sum. What a
+// vertex sees of them is interpolated too.
 //
 // A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
-// c; what is left over follows, all of red first; then texels of what is seen of the sky. 16 bytes a texel: 160 a vertex at
+// c; what is left over follows, all of red first; then texels of what is seen of the sky, and of lamps. 16 bytes a texel: 160 a vertex at
 // degree 4, 304 at 6, 496 at 8.
 
 import { coefficientsOf } from '../light/transfer';
 import { evaluateSh } from '../light/sh';
 import { componentRows, type StoredTransfer } from './kiln_reader';
+import { checkLamps, type FieldLamp, type LampExtension, lampHighlights } from './field_lamps';
 import { checkSky, kVisibilityCount, type MirroredSky, type SkyExtension } from './mirrored_sky';
 
 /// The root extension, as written.
@@ -28,18 +29,20 @@ export interface LightFieldExtension {
   scale: number[];
   offset: number[];
   sky?: SkyExtension;
+  lamps?: LampExtension; // of version 2
 }
 
 /// r-RFs of the vertices of one primitive.
 export interface FieldTexels {
   degree: number;
   sky: boolean; // the sky is kept apart
+  lamps: number; // so many lamps are
   halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(this) of each vertex
   unit: number; // a coefficient is unit * half; a power of two
 }
 
 /// What a field holds for each vertex.
-export type FieldShape = Pick<FieldTexels, 'degree' | 'sky'>;
+export type FieldShape = Pick<FieldTexels, 'degree' | 'sky' | 'lamps'>;
 
 const kName = 'KILN_light_field';
 const kMostDegree = 8;
@@ -51,11 +54,16 @@ export const fieldCount = (degree: number): number => (degree + 1) ** 2;
 const seriesTexels = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
 
 /// Texels of a vertex.
-export const texelsOf = ({ degree, sky }: FieldShape): number =>
+export const texelsOf = (shape: FieldShape): number => firstLampTexel(shape) + Math.ceil(shape.lamps / 8);
+
+const firstLampTexel = ({ degree, sky }: FieldShape): number =>
   seriesTexels(degree) + (sky ? Math.ceil(kVisibilityCount / 8) : 0);
 
 /// Which half of a vertex is coefficient `i` of what it sees of the sky. Those are not in units.
 export const skyHalfAt = (degree: number, i: number): number => 8 * seriesTexels(degree) + i;
+
+/// Which one is how much it sees of lamp `k`.
+export const lampHalfAt = (shape: FieldShape, k: number): number => 8 * firstLampTexel(shape) + k;
 
 /// Which half of a vertex is coefficient `i` of channel `c`.
 export function halfAt(degree: number, i: number, c: number): number {
@@ -75,7 +83,7 @@ function checkField(e: LightFieldExtension): void {
   const must = (good: boolean, member: keyof LightFieldExtension, what: string) => {
     if (!good) throw new Error(`/extensions/${kName}/${member}: ${what}`);
   };
-  must(e.version === 1, 'version', `only version 1 is read, this is ${e.version}`);
+  must(e.version === 1 || e.version === 2, 'version', `only versions 1 and 2 are read, this is ${e.version}`);
   const basis = e.basis === 'real-sh' && e.condonShortley === false;
   must(basis, 'basis', 'must be real-sh without the Condon-Shortley phase');
   must(e.reflected === true, 'reflected', 'radiance functions must be reflected');
@@ -89,6 +97,7 @@ function checkField(e: LightFieldExtension): void {
   for (const list of ['scale', 'offset'] as const)
     must(e[list]?.length === rank && e[list].every(Number.isFinite), list, `must be ${rank} numbers`);
   if (e.sky) checkSky(e.sky, `/extensions/${kName}/sky`);
+  if (e.lamps) checkLamps(e.lamps, `/extensions/${kName}/lamps`);
 }
 
 /// What the stored numbers mean, as if they were transfer vectors. `bytesIn`: of a buffer view.
@@ -102,28 +111,39 @@ export function storedField(
   return { ...shape, rows: componentRows(shape, bytesIn(e.components!.bufferView).slice().buffer) };
 }
 
-/// `attributes`: the `_SLF_k` of a primitive; `sky`: its `_SLF_SKY_k`, and what they mean. Components are expanded, once:
+/// What a vertex sees, and how it is written.
+interface SeenNumbers {
+  extension: { scale: number[]; offset: number[] };
+  attributes: readonly Float32Array[];
+}
+
+/// `attributes`: the `_SLF_k` of a primitive; `apart`: its `_SLF_SKY_k` and `_SLF_LAMP_k`. Components are expanded, once:
 /// rank * 3 (degree + 1)^2 products a vertex. Throws on what is not finite.
 export function fieldTexels(
   field: StoredTransfer,
   attributes: readonly Float32Array[],
-  sky?: { extension: SkyExtension; attributes: readonly Float32Array[] },
+  apart: { sky?: SeenNumbers; lamps?: SeenNumbers } = {},
 ): FieldTexels {
   const degree = field.order - 1;
   const stride = 3 * field.slots;
   const vertices = attributes[0].length / 4;
-  const out = emptyTexels({ degree, sky: sky !== undefined }, vertices, largestOf(field));
-  const { series, visibility } = texelWriter(out);
+  const out = emptyTexels(
+    { degree, sky: apart.sky !== undefined, lamps: apart.lamps?.extension.scale.length ?? 0 },
+    vertices, largestOf(field),
+  );
+  const { series, visibility, lamps } = texelWriter(out);
   for (let first = 0; first < vertices; first += kBatch) {
     const numbers = coefficientsOf(field, attributes.map((all) => all.subarray(4 * first, 4 * (first + kBatch))));
     for (let from = 0, v = first; from < numbers.length; from += stride, ++v) series(v, numbers, from);
   }
-  if (!sky) return out;
-  const { scale, offset } = sky.extension;
-  const own = new Float32Array(kVisibilityCount);
-  for (let v = 0; v < vertices; ++v) {
-    for (let i = 0; i < own.length; ++i) own[i] = offset[i] + scale[i] * sky.attributes[i >> 2][4 * v + (i & 3)];
-    visibility(v, own, 0);
+  for (const [numbers, write] of [[apart.sky, visibility], [apart.lamps, lamps]] as const) {
+    if (!numbers) continue;
+    const { scale, offset } = numbers.extension;
+    const own = new Float32Array(scale.length);
+    for (let v = 0; v < vertices; ++v) {
+      for (let i = 0; i < own.length; ++i) own[i] = offset[i] + scale[i] * numbers.attributes[i >> 2][4 * v + (i & 3)];
+      write(v, own, 0);
+    }
   }
   return out;
 }
@@ -134,8 +154,8 @@ export function emptyTexels(shape: FieldShape, vertices: number, largest: number
   return { ...shape, halves: new Uint16Array(8 * texelsOf(shape) * vertices), unit };
 }
 
-/// Functions that write the coefficients of a vertex, those of red first, or what it sees of the sky; both stand at `from`
-/// of `numbers`.
+/// Functions that write the coefficients of a vertex, those of red first, or what it sees of the sky or of lamps; they stand
+/// at `from` of `numbers`.
 export function texelWriter(field: FieldTexels) {
   const { degree, halves, unit } = field;
   const [count, width] = [fieldCount(degree), 8 * texelsOf(field)];
@@ -147,6 +167,10 @@ export function texelWriter(field: FieldTexels) {
     visibility: (vertex: number, numbers: Float32Array, from: number): void => {
       for (let i = 0; i < kVisibilityCount; ++i)
         halves[width * vertex + skyHalfAt(degree, i)] = halfOf(numbers[from + i]);
+    },
+    lamps: (vertex: number, numbers: Float32Array, from: number): void => {
+      for (let k = 0; k < field.lamps; ++k)
+        halves[width * vertex + lampHalfAt(field, k)] = halfOf(numbers[from + k]);
     },
   };
 }
@@ -192,14 +216,16 @@ export function reflectedView(normal: Vector, view: Vector): Vector {
   return normal.map((n, a) => 2 * Math.max(0, above) * n - (size > 0 ? raised[a] / size : n)) as unknown as Vector;
 }
 
-/// What mirrors the sky at a place, and the sky.
+/// What mirrors the sky and lamps at a place, and these.
 export interface Mirror {
-  sky: MirroredSky;
+  sky: MirroredSky | null;
+  lamps: readonly FieldLamp[];
+  place: Vector; // unit cube
   f0: Vector;
   roughness: number;
 }
 
-/// Radiance that an eye sees between three vertices: (8). `weights` are barycentric. `mirror`: where the sky is kept apart.
+/// Radiance that an eye sees between three vertices: (8). `weights` are barycentric. `mirror`: where something is kept apart.
 export function seenRadiance(
   field: FieldTexels,
   corners: Vector,
@@ -217,10 +243,13 @@ export function seenRadiance(
   const series = [0, 1, 2].map(
     (c) => field.unit * y.reduce((sum, yi, i) => sum + yi * mixed(halfAt(field.degree, i, c)), 0),
   );
-  if (!field.sky || !mirror) return series.map((x) => Math.max(0, x));
-  const visibility = Array.from({ length: kVisibilityCount }, (_, i) => mixed(skyHalfAt(field.degree, i)));
+  if (!mirror) return series.map((x) => Math.max(0, x));
+  const { sky, lamps, place, f0, roughness } = mirror;
   const above = dot(normal, r);
   const raised = normal.map((n, a) => 2 * above * n - r[a]) as unknown as Vector;
-  const added = mirror.sky.seen(normal, raised, mirror.f0, mirror.roughness, visibility);
-  return series.map((x, c) => Math.max(0, x + added[c]));
+  const visibility = Array.from({ length: kVisibilityCount }, (_, i) => mixed(skyHalfAt(field.degree, i)));
+  const seen = Array.from({ length: field.lamps }, (_, k) => mixed(lampHalfAt(field, k)));
+  const ofSky = field.sky && sky ? sky.seen(normal, raised, f0, roughness, visibility) : [0, 0, 0];
+  const ofLamps = lampHighlights(lamps.slice(0, field.lamps), seen, { place, normal, view: raised, f0, roughness });
+  return series.map((x, c) => Math.max(0, x + ofSky[c] + ofLamps[c]));
 }

@@ -7,6 +7,7 @@
 import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
 import { type FieldTexels, fieldTexels, readLightField, storedField } from './light_field';
+import type { FieldLamp, LampExtension } from './field_lamps';
 import { readSky, type SkyData, type SkyExtension } from './mirrored_sky';
 import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
 import {
@@ -35,12 +36,13 @@ export interface Unpacked {
   links: LightLinks | null; // for lamps that move
   progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
   sky: SkyData | null; // that the light field keeps apart
+  lamps: FieldLamp[]; // that it keeps apart too
 }
 
 /// A light field on its way out of the file.
 interface StoredField {
   series: StoredTransfer;
-  extension: SkyExtension | undefined;
+  apart: { sky?: SkyExtension; lamps?: LampExtension };
   sky: SkyData | null;
 }
 
@@ -142,6 +144,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     links,
     progressive,
     sky: field?.sky ?? null,
+    lamps: field?.apart.lamps?.lights ?? [],
   };
 }
 
@@ -161,8 +164,8 @@ function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLink
 function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredField | null {
   const extension = readLightField(json);
   if (!extension) return null;
-  const { sky } = takeExtension(json, kField, extension);
-  return { series: storedField(extension, bytesIn), extension: sky, sky: sky ? readSky(sky, bytesIn) : null };
+  const { sky, lamps } = takeExtension(json, kField, extension);
+  return { series: storedField(extension, bytesIn), apart: { sky, lamps }, sky: sky ? readSky(sky, bytesIn) : null };
 }
 
 /// A copy: light/progressive_mesh.ts reads it when it is asked for.
@@ -259,10 +262,12 @@ function takeBaked(
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
   const all = (list: readonly string[]) => list.map((name) => floatsOf(name, 4));
-  const seenSky = light?.extension;
-  const sky = seenSky && { extension: seenSky, attributes: all(seenSky.attributes) };
-  const field = light && fieldTexels(light.series, all(light.series.attributes), sky);
-  const taken = [...names, ...matrices, ...(light?.series.attributes ?? []), ...(sky?.extension.attributes ?? []), 'COLOR_0'];
+  const { sky, lamps } = light?.apart ?? {};
+  const seen = <T extends { attributes: string[] }>(extension: T | undefined) =>
+    extension && { extension, attributes: all(extension.attributes) };
+  const field = light && fieldTexels(light.series, all(light.series.attributes), { sky: seen(sky), lamps: seen(lamps) });
+  const apart = [light?.series, sky, lamps].flatMap((one) => one?.attributes ?? []);
+  const taken = [...names, ...matrices, ...apart, 'COLOR_0'];
   for (const name of taken) delete primitive.attributes[name];
   const [positions, normals] = [floatsOf('POSITION', 3), floatsOf('NORMAL', 3)];
   return { stored, weights, field, positions, normals, indices: mesh.indices() };

@@ -3,6 +3,7 @@
 
 import type { EquirectMap } from './equirect';
 import type { FieldTexels } from '../asset/light_field';
+import type { FieldLamp } from '../asset/field_lamps';
 import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 
@@ -71,12 +72,13 @@ export interface ProjectReply {
 export type Reply = { serial: number } & (
   | { begun: true }
   // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
-  // numbers; the light field of each part, and the sky it keeps apart; the bytes of a progressive mesh
+  // numbers; the light field of each part, and the sky and lamps it keeps apart; the bytes of a progressive mesh
   | {
       opened: ArrayBuffer;
       samples: Float32Array | null;
       field: FieldTexels[] | null;
       sky: SkyData | null;
+      lamps: FieldLamp[];
       progressive: Uint8Array<ArrayBuffer> | null;
     }
   | { values: ValuesReply }

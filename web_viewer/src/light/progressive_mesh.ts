@@ -1,6 +1,7 @@
 // A lit mesh at every level of detail, from the bytes of KILN_progressive_mesh (core/lightfield/README.md).
 // Level k is the base and k splits. Nothing is added up: each level has the bits of core/lightfield/progressive_mesh.h.
 
+import { kMostLamps } from '../asset/field_lamps';
 import { kVisibilityCount } from '../asset/mirrored_sky';
 
 /// Numbers of each vertex (or row): an array and how many of its elements a vertex has.
@@ -32,6 +33,7 @@ const kError = 4;
 const kMostNew = 6; // vertices of a split
 const kMostDegree = 8;
 const kPart = 16; // of `has`
+const kALamp = 64; // of the rest of it: times the number of lamps
 const kOptional = [
   { bit: 1, name: 'uv0', width: 2 },
   { bit: 2, name: 'uv1', width: 2 },
@@ -51,17 +53,19 @@ function readHeader(buffer: ArrayBuffer): Header {
     0,
     kHeader / 4,
   );
-  if (magic !== kMagic || degree > kMostDegree || has > 63 || rank > 3 * (degree + 1) ** 2 || wide > rank)
+  if (magic !== kMagic || degree > kMostDegree || has >= kALamp * (kMostLamps + 1) || rank > 3 * (degree + 1) ** 2 || wide > rank)
     fail('the version is not known');
   return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank, wide };
 }
 
 /// Columns of vertices in the order of the file.
 function columnsOf(h: Header): { name: string; width: number }[] {
+  const lamps = Math.floor(h.has / kALamp);
   return [
     { name: 'position', width: 3 },
     { name: 'normal', width: 3 },
     ...kOptional.filter(({ bit }) => h.has & bit),
+    ...(lamps > 0 ? [{ name: 'lamps', width: lamps }] : []),
     { name: 'coefficients', width: 3 * (h.degree + 1) ** 2 },
   ];
 }

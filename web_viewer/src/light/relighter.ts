@@ -1,6 +1,7 @@
 // The page's side of the light worker. Owns the worker: dispose() ends it.
 
 import type { FieldTexels } from '../asset/light_field';
+import type { FieldLamp } from '../asset/field_lamps';
 import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
@@ -21,6 +22,7 @@ export class Relighter {
   field: FieldTexels[] | null = null;
   /// What that keeps apart; null: nothing.
   sky: SkyData | null = null;
+  lamps: FieldLamp[] = [];
   /// The bytes of its progressive mesh; null: it has none.
   progressive: Uint8Array<ArrayBuffer> | null = null;
 
@@ -37,7 +39,8 @@ export class Relighter {
   async open(file: ArrayBuffer): Promise<ArrayBuffer> {
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
-    [this.samples, this.field, this.sky, this.progressive] = [reply.samples, reply.field, reply.sky, reply.progressive];
+    ({ samples: this.samples, field: this.field, progressive: this.progressive } = reply);
+    ({ sky: this.sky, lamps: this.lamps } = reply);
     return reply.opened;
   }
 

@@ -11,6 +11,7 @@ import {
   Vector3,
 } from 'three';
 import { type FieldTexels, type Mirror, seenRadiance } from '../asset/light_field';
+import type { FieldLamp } from '../asset/field_lamps';
 import { MirroredSky, type SkyData } from '../asset/mirrored_sky';
 import { fieldMaterial, fieldTexture, type SkyLook } from '../shaders/field_material';
 import { lobeTexture } from '../shaders/mirror';
@@ -39,8 +40,12 @@ export class FieldLook {
   readonly sky: SkyLook | null = null;
   private readonly mirrored: MirroredSky | null = null;
 
+  readonly lamps: readonly FieldLamp[];
+
   /// `most`: texels that a texture may have across. Throws where a part needs more.
-  constructor(model: BakedModel, field: readonly FieldTexels[], sky: SkyData | null, most: number) {
+  constructor(model: BakedModel, field: readonly FieldTexels[], apart: { sky: SkyData | null; lamps: FieldLamp[] }, most: number) {
+    const { sky, lamps } = apart;
+    this.lamps = lamps;
     this.degree = field[0].degree;
     this.bytes = field.reduce((sum, { halves }) => sum + halves.byteLength, 0);
     if (sky) {
@@ -48,7 +53,7 @@ export class FieldLook {
       this.sky = { texture: skyTexture(this.mirrored), unit: sky.unit, lobes: lobeTexture(sky.lobes, 1) };
       this.bytes += this.sky.texture.image.data!.byteLength;
     }
-    this.parts = model.parts.map((part, i) => dress(part, field[i], this.sky, most));
+    this.parts = model.parts.map((part, i) => dress(part, field[i], this, most));
   }
 
   /// null: the model's own look, where nobody else has put another on it.
@@ -73,7 +78,12 @@ export class FieldLook {
       normal.addScaledVector(new Vector3().fromBufferAttribute(attributes.normal, v), weights[k]),
     );
     const view = eye.clone().sub(point).normalize();
-    const mirror = this.mirrored ? mirrorAt(this.mirrored, part.part, corners, weights) : undefined;
+    const place = new Vector3();
+    corners.forEach((v, k) =>
+      place.addScaledVector(new Vector3().fromBufferAttribute(attributes.position, v), weights[k]),
+    );
+    const { mirrored: sky, lamps } = this;
+    const mirror = { sky, lamps, place: place.toArray(), ...mirroringAt(part.part, corners, weights) };
     return seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray(), mirror);
   }
 
@@ -89,27 +99,26 @@ export class FieldLook {
   }
 }
 
-function dress(part: BakedPart, field: FieldTexels, sky: SkyLook | null, most: number): Dressed {
+function dress(part: BakedPart, field: FieldTexels, { sky, lamps }: FieldLook, most: number): Dressed {
   const { mesh, geometry, material, unlit, albedo, finish } = part;
   const own = { geometry, material };
   const { texture, texels } = fieldTexture(field, most);
   const vertexAlbedo = own.geometry.hasAttribute('_albedo');
-  const surface = { shape: field, texture, unit: field.unit, unlit, albedo, finish, sky, vertexAlbedo };
+  const surface = { shape: field, texture, unit: field.unit, unlit, albedo, finish, sky, lamps, vertexAlbedo };
   const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
   return { part, mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
 }
 
-/// What the surface makes of the sky there.
-function mirrorAt(
-  sky: MirroredSky,
+/// How the surface mirrors there.
+function mirroringAt(
   part: BakedPart,
   corners: readonly number[],
   weights: readonly number[],
-): Mirror {
+): Pick<Mirror, 'f0' | 'roughness'> {
   const base = colourAt(part, corners, weights);
   const [roughness, metallic] = finishAt(part, corners, weights);
   const f0 = base.map((c) => 0.04 * (1 - metallic) + c * metallic) as [number, number, number];
-  return { sky, f0, roughness };
+  return { f0, roughness };
 }
 
 const kKept = ['position', 'normal', 'uv', 'uv1', '_albedo'];

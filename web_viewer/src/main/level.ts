@@ -44,7 +44,7 @@ export class Level {
   ) {
     if (!relighter.field) return;
     try {
-      this.field = new FieldLook(model, relighter.field, relighter.sky, most);
+      this.field = new FieldLook(model, relighter.field, relighter, most);
       relighter.field = null; // the look has its own
     } catch (error) {
       this.missing = (error as Error).message;
@@ -53,7 +53,7 @@ export class Level {
 
   /// Takes relighter, which has opened the file. `most`: texels that a texture may have across.
   static async create(asset: LoadedAsset, relighter: Relighter, most: number): Promise<Level> {
-    return new Level(asset, await BakedModel.create(asset, relighter.sky !== null), relighter, most);
+    return new Level(asset, await BakedModel.create(asset, relighter.sky !== null || relighter.lamps.length > 0), relighter, most);
   }
 
   dispose(): void {

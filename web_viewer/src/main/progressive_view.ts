@@ -5,9 +5,10 @@
 import { BufferAttribute, BufferGeometry, type DataTexture, Group, Mesh, type ShaderMaterial } from 'three';
 import { emptyTexels, type FieldTexels, texelWriter } from '../asset/light_field';
 import { ProgressiveMesh } from '../light/progressive_mesh';
-import { fieldMaterial, fieldTexture, type SkyLook } from '../shaders/field_material';
+import { fieldMaterial, fieldTexture } from '../shaders/field_material';
 import { count, percent } from '../ui/format';
 import type { BakedPart } from './baked_model';
+import type { FieldLook } from './field_look';
 import type { Viewer } from './viewer';
 import type { ViewState } from './view_state';
 
@@ -71,6 +72,9 @@ interface Part {
   used: number; // triangles
 }
 
+/// What the light field keeps apart.
+type Apart = Pick<FieldLook, 'sky' | 'lamps'>;
+
 const kAttributes = [
   ['position', 'position'],
   ['normal', 'normal'],
@@ -91,20 +95,23 @@ class ProgressiveShape {
   /// Throws, in words, on bytes that do not fit together or the scene.
   constructor(bytes: Uint8Array, { model, stage, level }: Viewer) {
     const sky = level.field?.sky ?? null;
+    const lamps = level.field?.lamps ?? [];
     this.mesh = new ProgressiveMesh(bytes);
     if (this.mesh.part.some((part) => part >= model.parts.length))
       throw new Error('The progressive mesh has parts that the scene has not.');
     this.base = this.mesh.vertexCount;
     const light = this.mesh.columns.get('coefficients')!;
     const all = light.values.length / light.width;
-    const shape = { degree: this.mesh.degree, sky: this.mesh.columns.has('visibility') };
+    const { degree, columns } = this.mesh;
+    const shape = { degree, sky: columns.has('visibility'), lamps: columns.get('lamps')?.width ?? 0 };
     if (shape.sky && !sky) throw new Error('The progressive mesh sees a sky that the scene has not.');
+    if (shape.lamps !== lamps.length) throw new Error('The progressive mesh sees other lamps than the scene has.');
     const empty = emptyTexels(shape, all, this.mesh.largest('coefficients'));
     ({ texture: this.texture, texels: this.texels } = fieldTexture(empty, stage.renderer.capabilities.maxTextureSize));
     this.write = texelWriter(this.texels);
     for (let v = 0; v < all; ++v) this.writeTexels(v);
     this.mesh.touched.clear();
-    this.parts = model.parts.map((part, i) => this.makePart(part, sky, i));
+    this.parts = model.parts.map((part, i) => this.makePart(part, { sky, lamps }, i));
     for (const { mesh } of this.parts) this.group.add(mesh);
     this.group.matrixAutoUpdate = false;
     this.group.matrix.copy(model.parts[0].mesh.matrixWorld); // one node has all parts
@@ -126,8 +133,8 @@ class ProgressiveShape {
   }
 
   private writeTexels(vertex: number): void {
-    const { series, visibility } = this.write;
-    for (const [name, into] of [['coefficients', series], ['visibility', visibility]] as const) {
+    const { series, visibility, lamps } = this.write;
+    for (const [name, into] of [['coefficients', series], ['visibility', visibility], ['lamps', lamps]] as const) {
       const column = this.mesh.columns.get(name);
       if (column) into(vertex, column.values, column.width * vertex);
     }
@@ -155,7 +162,7 @@ class ProgressiveShape {
     }
   }
 
-  private makePart({ unlit, albedo, finish, geometry: own }: BakedPart, sky: SkyLook | null, index: number): Part {
+  private makePart({ unlit, albedo, finish, geometry: own }: BakedPart, { sky, lamps }: Apart, index: number): Part {
     const { part, triangles, columns } = this.mesh;
     const most = part.length > 0 ? part.reduce((sum, one) => sum + Number(one === index), 0) : triangles.length / 3;
     const geometry = new BufferGeometry();
@@ -172,7 +179,7 @@ class ProgressiveShape {
     geometry.setAttribute('corners', new BufferAttribute(corners, 3));
     const vertexAlbedo = geometry.hasAttribute('_albedo');
     const { unit } = this.texels;
-    const surface = { shape: this.texels, unit, texture: this.texture, unlit, albedo, finish, sky, vertexAlbedo };
+    const surface = { shape: this.texels, unit, texture: this.texture, unlit, albedo, finish, sky, lamps, vertexAlbedo };
     const materials = [fieldMaterial(surface, false), fieldMaterial(surface, true)] as const;
     const mesh = new Mesh(geometry, materials[0]);
     mesh.frustumCulled = false; // its bounds change with the level

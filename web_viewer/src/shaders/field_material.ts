@@ -1,8 +1,8 @@
 // The material of light fields: what asset/light_field.ts says, for each fragment, with the three corners' r-RFs as they
 // are. The geometry has three vertices of its own for each triangle (main/field_look.ts): a fragment must know its
 // corners, and WebGL 2 does not tell. Harmonics are evaluated once, whatever the number of corners. Albedo, textures and
-// emission are in the field; of the textures only the opacity counts. Where the field keeps the sky apart (sky_code.ts),
-// base colour and finish say how a fragment mirrors it.
+// emission are in the field; of the textures only the opacity counts. Where the field keeps the sky apart (sky_code.ts) or
+// lamps (lamp_code.ts), base colour and finish say how a fragment mirrors them.
 //
 // With PER_VERTEX the field is evaluated at the vertices and colours are interpolated (figure 6 of the paper): several
 // times faster, and highlights break at edges.
@@ -17,10 +17,12 @@ import {
   type Texture,
   UnsignedIntType,
 } from 'three';
-import { type FieldShape, type FieldTexels, fieldCount, halfAt, skyHalfAt, texelsOf } from '../asset/light_field';
+import { type FieldShape, type FieldTexels, fieldCount, halfAt, lampHalfAt, skyHalfAt, texelsOf } from '../asset/light_field';
+import type { FieldLamp } from '../asset/field_lamps';
 import { kVisibilityCount } from '../asset/mirrored_sky';
 import { type Finish, sides, transformOf, uvOf } from './baked_material';
 import { harmonicsCode } from './harmonics_code';
+import { lampFunctions, lampUniforms } from './lamp_code';
 import { skyFunctions } from './sky_code';
 
 /// r-RFs as a texture, and the same r-RFs in its own memory, so that nobody need keep the first ones. No vertex is split
@@ -42,7 +44,8 @@ export function fieldTexture(field: FieldTexels, most: number): { texture: DataT
   return { texture, texels: { ...field, halves: own } };
 }
 
-/// radianceSeen(corners, weights, n, v, mirror): n and v are unit, v towards the eye; mirror is F0 and roughness.
+/// radianceSeen(corners, weights, place, n, v, mirror): the place is of the unit cube, n and v are unit, v towards the eye;
+/// mirror is F0 and roughness.
 function fieldFunctions(shape: FieldShape): string {
   const { degree } = shape;
   const products: string[][] = Array.from({ length: texelsOf(shape) }, (_, texel) => [
@@ -55,6 +58,7 @@ function fieldFunctions(shape: FieldShape): string {
       put(halfAt(degree, i, c), (one) => `sum.${'rgb'[c]} += ${one} * y${i};`);
   for (let i = 0; shape.sky && i < kVisibilityCount; ++i)
     put(skyHalfAt(degree, i), (one) => `visibility[${i}] = ${one};`);
+  for (let k = 0; k < shape.lamps; ++k) put(lampHalfAt(shape, k), (one) => `lamps[${k}] = ${one};`);
   return /* glsl */ `
 uniform highp usampler2D field;
 uniform float fieldUnit;
@@ -70,7 +74,8 @@ void fetchEight(ivec2 a, ivec2 b, ivec2 c, vec3 weights, int texel, out vec4 low
   high = weights.x * four(p.zw) + weights.y * four(q.zw) + weights.z * four(r.zw);
 }
 ${shape.sky ? skyFunctions : ''}
-vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 n, vec3 v, vec4 mirror) {
+${shape.lamps > 0 ? lampFunctions(shape.lamps) : ''}
+vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, vec4 mirror) {
   float above = dot(n, v);
   vec3 raised = v - min(above, 0.0) * n;
   float size = length(raised);
@@ -82,9 +87,11 @@ vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 n, vec3 v, vec4 mirror) {
   vec3 sum = vec3(0.0);
   vec4 low, high;
   ${shape.sky ? `float visibility[${kVisibilityCount}];` : ''}
+  ${shape.lamps > 0 ? `float lamps[${shape.lamps}];` : ''}
   ${products.flat().join('\n  ')}
   sum *= fieldUnit;
   ${shape.sky ? 'sum += mirroredSky(n, seen, mirror.rgb, mirror.a, visibility);' : ''}
+  ${shape.lamps > 0 ? 'sum += lampHighlights(place, n, seen, mirror.rgb, mirror.a, lamps);' : ''}
   return max(sum, vec3(0.0));
 }`;
 }
@@ -96,6 +103,7 @@ centroid varying vec3 vSeen;
 #else
 flat varying ivec3 vCorners;
 centroid varying vec3 vWeights;
+centroid varying vec3 vPlace;
 centroid varying vec3 vNormal;
 centroid varying vec3 vToEye;
 #endif
@@ -174,10 +182,11 @@ void main() {
 #endif
 #ifdef PER_VERTEX
   ivec3 here = ivec3(int(corners[own]));
-  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), normalize(n), normalize(toEye), mirrorOf(baseHere().rgb));
+  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), position, normalize(n), normalize(toEye), mirrorOf(baseHere().rgb));
 #else
   vCorners = ivec3(corners);
   vWeights = vec3(own == 0, own == 1, own == 2);
+  vPlace = position;
   vNormal = n;
   vToEye = toEye;
 #endif
@@ -200,7 +209,7 @@ void main() {
 #ifdef PER_VERTEX
   vec3 seen = vSeen;
 #else
-  vec3 seen = radianceSeen(vCorners, vWeights, normalize(vNormal), normalize(vToEye), mirrorOf(base.rgb));
+  vec3 seen = radianceSeen(vCorners, vWeights, vPlace, normalize(vNormal), normalize(vToEye), mirrorOf(base.rgb));
 #endif
   gl_FragColor = vec4(seen, base.a);
   #include <tonemapping_fragment>
@@ -223,15 +232,17 @@ export interface FieldSurface {
   albedo: readonly number[];
   finish: Finish | null;
   sky: SkyLook | null;
+  lamps: readonly FieldLamp[];
   vertexAlbedo: boolean; // the geometry has `_albedo`
 }
 
 /// Owns only itself; the textures belong to others.
 export function fieldMaterial(surface: FieldSurface, perVertex: boolean): ShaderMaterial {
-  const { shape, texture, unit, unlit, albedo, finish, sky, vertexAlbedo } = surface;
+  const { shape, texture, unit, unlit, albedo, finish, sky, lamps, vertexAlbedo } = surface;
+  const mirrors = sky !== null || lamps.length > 0;
   const defines: Record<string, string> = {};
-  const map = sky || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
-  const finishMap = sky ? (finish?.map ?? null) : null;
+  const map = mirrors || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
+  const finishMap = mirrors ? (finish?.map ?? null) : null;
   if (perVertex) defines.PER_VERTEX = '';
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (map) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(map)];
@@ -251,6 +262,7 @@ export function fieldMaterial(surface: FieldSurface, perVertex: boolean): Shader
       sky: { value: sky?.texture ?? null },
       skyUnit: { value: sky?.unit ?? 1 },
       lobes: { value: sky?.lobes ?? null },
+      ...lampUniforms(lamps.slice(0, shape.lamps)),
       albedo: { value: [r, g, b, unlit.opacity] },
       alphaCutoff: { value: unlit.alphaTest },
       albedoMap: { value: map },

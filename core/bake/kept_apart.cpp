@@ -1,4 +1,4 @@
-#include "core/bake/sky_apart.h"
+#include "core/bake/kept_apart.h"
 
 #include <algorithm>
 #include <cmath>
@@ -43,7 +43,7 @@ double left_by_bands(const Environment& sky, int degree) {
   return level > 0 ? std::sqrt(left) / level : 0;
 }
 
-SkyDecision decide_sky(const Scene& scene, const Environment* sky, int degree, double share, SkyPart asked) {
+ApartDecision decide_sky(const Scene& scene, const Environment* sky, int degree, double share, SkyPart asked) {
   const std::string because = asked == SkyPart::automatic ? "" : "asked for by the recipe";
   if (sky == nullptr) return {false, "there is none"};
   if (degree + 1 < kVisibilityOrder) return {false, "the series has fewer bands than what is seen of the sky"};
@@ -56,6 +56,18 @@ SkyDecision decide_sky(const Scene& scene, const Environment* sky, int degree, d
   const std::string bands = std::to_string(degree + 1) + " bands leave " + short_text(100 * left) + " % of the sky out";
   if (left <= share) return {false, bands};
   return {true, "surfaces of " + roughness + " mirror it, and " + bands};
+}
+
+ApartDecision decide_lamps(const Scene& scene) {
+  if (scene.lights.empty()) return {false, "there are none"};
+  const double smooth = least_roughness(scene);
+  const std::string roughness = "roughness " + short_text(smooth);
+  if (!(share_apart(smooth) > 0)) return {false, "the smoothest surface has " + roughness + ": the series holds them"};
+  const std::size_t all = scene.lights.size();
+  const std::string which =
+      all > kMostFieldLamps ? "the " + std::to_string(kMostFieldLamps) + " brightest of " + std::to_string(all) + ": "
+                            : "";
+  return {true, which + "surfaces of " + roughness + " mirror them as points"};
 }
 
 }  // namespace kiln

@@ -1,0 +1,88 @@
+#include "core/lightfield/lamp_highlights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/trace/ggx.h"
+#include "core/trace/lights.h"
+
+namespace kiln {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kSeenAlpha = 0.5, kTurn = 0.3;  // of the blur that distances see, and of normals: as of the sky
+constexpr int kSteps = 256;
+
+/// What an eye on the normal is sent by light of 1 from an angle beside it, at F0 = 1.
+double blurred(double angle) { return ggx_cosine(kSeenAlpha, {0, 0, 1}, {std::sin(angle), 0, std::cos(angle)}); }
+
+/// Mean over the sphere of a function of the angle.
+template <class Function>
+double mean_over_angles(const Function& f) {
+  double sum = 0, all = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double angle = kPi * (i + 0.5) / kSteps;
+    sum += std::sin(angle) * f(angle), all += std::sin(angle);
+  }
+  return sum / all;
+}
+
+/// Of a band, and the Legendre polynomial of it.
+double legendre(int band, double z) { return band == 0 ? 1 : band == 1 ? z : 1.5 * z * z - 0.5; }
+
+}  // namespace
+
+FieldLamp make_field_lamp(const Light& light, const Vec3f& mean) {
+  FieldLamp out{.light = light, .mean = mean};
+  const bool distant = light.type == LightType::directional;
+  const Vec3d way = distant ? -to_double(light.direction) : to_double(light.position);
+  std::array<double, kVisibilityCount> y{};
+  evaluate_sh(kVisibilityOrder, normalized(way, Vec3d{0, 1, 0}), y.data());
+  double squares = 0;
+  for (int band = 0, i = 0; band < kVisibilityOrder; ++band) {
+    const double c =
+        4 * kPi * mean_over_angles([&](double a) { return blurred(a) * legendre(band, std::cos(a)); });  // Funk-Hecke
+    for (const int end = sh_count(band + 1); i < end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      out.lobe[k] = static_cast<float>(c * y[k]);
+      squares += double{out.lobe[k]} * double{out.lobe[k]};
+    }
+  }
+  // Few bands stand for the whole lobe, as large as it is.
+  const double whole = 4 * kPi * mean_over_angles([](double a) { return blurred(a) * blurred(a); });
+  for (float& c : out.lobe) c *= static_cast<float>(std::sqrt(whole / squares));
+  return out;
+}
+
+double lamp_slope(std::span<const FieldLamp> lamps) {
+  double all = 0;
+  for (const FieldLamp& lamp : lamps) all += double{dot(lamp.mean, lamp.mean)};
+  if (!(all > 0)) return 0;
+  const double slope = mean_over_angles([](double a) {
+    const double off = blurred(std::min(kPi, a + kTurn)) - blurred(a);
+    return off * off / (kTurn * kTurn);
+  });
+  // As with the sky (outgoing.cpp): the mirror direction turns by 8/3 in the mean square over eyes.
+  return 8.0 / 3 * slope * all;
+}
+
+Vec3d lamp_highlights(std::span<const FieldLamp> lamps, std::span<const double> seen, const LampEye& eye) {
+  constexpr double kGrazing = 1e-3;
+  const double above = dot(eye.normal, eye.view), z = std::clamp(above, kGrazing, 1.0);
+  const double alpha = ggx_alpha(eye.roughness);
+  const Vec3d x = normalized(eye.view - eye.normal * above, basis_around(eye.normal).x), y = cross(eye.normal, x);
+  const Vec3d v{std::sqrt(1 - z * z), 0, z};
+  Vec3d sum;
+  for (std::size_t k = 0; k < lamps.size(); ++k) {
+    if (!(seen[k] > 0)) continue;
+    const LightArrival arrival = light_arrival(lamps[k].light, eye.place);
+    const Vec3d l{dot(arrival.direction, x), dot(arrival.direction, y), dot(arrival.direction, eye.normal)};
+    const double lobe = ggx_cosine(alpha, v, l);
+    if (!(lobe > 0)) continue;
+    sum += (eye.f0 + (Vec3d{1, 1, 1} - eye.f0) * schlick_weight(v, l)) * arrival.irradiance * (lobe * seen[k]);
+  }
+  return sum;
+}
+
+}  // namespace kiln
