@@ -6,6 +6,7 @@
 
 #include "core/artifact/stored_transfer.h"
 #include "core/bake/kept_apart.h"
+#include "core/bake/normal_maps.h"
 #include "core/bake/radiosity_step.h"
 #include "core/lightfield/polynomial_space.h"
 #include "core/trace/surface.h"
@@ -41,6 +42,21 @@ FieldEffort field_effort(const Recipe& recipe) {
 Quality surface_quality(const Recipe& recipe) {
   if (!recipe.promise) return recipe.quality;
   return recipe.promise.target_error.value_or(0.1) < 0.05 ? Quality::standard : Quality::draft;
+}
+
+/// The surface is baked, and shown, with the normals of its vertices.
+void decide_normal_maps(Plan& plan, const Scene& scene) {
+  const auto maps = find_normal_maps(scene);
+  if (!maps) return;
+  const std::string tilt = maps->degrees > 0
+                               ? "they tilt normals by " + short_text(maps->degrees) + " degrees (root mean square)"
+                               : std::string("their images cannot be read");
+  decide(plan, "normal maps", "left out", "light fields have the normals of vertices; " + tilt);
+  for (const std::size_t m : maps->materials)
+    plan.warnings.push_back(
+        {"normal_map_not_baked",
+         "A light field shows the surface without its normal map, and so does its certificate; " + tilt + ".",
+         "/materials/" + std::to_string(m)});
 }
 
 TransferPoint first_corner(const Mesh& mesh, const Triangle& t) {
@@ -132,6 +148,7 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   const ApartDecision lamps = decide_lamps(scene);
   f.outgoing.lamps_apart = lamps.apart;
   decide(plan, "lamps", lamps.apart ? "apart" : "in the series", lamps.reason);
+  decide_normal_maps(plan, scene);
   decide_simplification(plan, recipe);
   add_field_prediction(plan);
   return plan;

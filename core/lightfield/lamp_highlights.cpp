@@ -11,8 +11,8 @@ namespace kiln {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kSeenAlpha = 0.5, kTurn = 0.3;  // of the blur that distances see, and of normals: as of the sky
-constexpr int kSteps = 256;
+constexpr double kSeenAlpha = 0.15, kTurn = 0.1;  // of the blur that distances see, and of normals (README.md)
+constexpr int kSteps = 1024;
 
 /// What an eye on the normal is sent by light of 1 from an angle beside it, at F0 = 1.
 double blurred(double angle) { return ggx_cosine(kSeenAlpha, {0, 0, 1}, {std::sin(angle), 0, std::cos(angle)}); }

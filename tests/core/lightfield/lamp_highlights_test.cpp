@@ -44,7 +44,7 @@ Scene plate(float roughness) {
 OutgoingLight baked(const Tracer& tracer, bool apart, Threads& threads) {
   const std::vector<Vec3f> value(tracer.scene().mesh.position.size());
   const GatherFaces faces(tracer.scene());
-  return bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 6, .rays = 128, .lamps_apart = apart},
+  return bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 2, .rays = 128, .lamps_apart = apart},
                        threads);
 }
 
@@ -173,10 +173,10 @@ TEST(LampHighlights, DistancesSeeALobeOfTheRightSize) {
   double sum = 0, all = 0, squares = 0;
   for (int i = 0; i < 4000; ++i) {
     const double a = std::numbers::pi * (i + 0.5) / 4000, weight = std::sin(a);
-    sum += weight * std::pow(ggx_cosine(0.5, {0, 0, 1}, {std::sin(a), 0, std::cos(a)}), 2), all += weight;
+    sum += weight * std::pow(ggx_cosine(0.15, {0, 0, 1}, {std::sin(a), 0, std::cos(a)}), 2), all += weight;
   }
   for (const float c : made.lobe) squares += double{c} * double{c} / (4 * std::numbers::pi);
-  EXPECT_NEAR(squares, sum / all, 1e-4 * sum / all);  // 256 steps of quadrature
+  EXPECT_NEAR(squares, sum / all, 1e-3 * sum / all);  // 1024 steps of quadrature
   // Along +y it is brightest: the direction to the lamp.
   const auto along = [&](const Vec3d& w) {
     std::array<double, kVisibilityCount> y{};
