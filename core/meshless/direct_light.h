@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/base/threads.h"
-#include "core/meshless/flat_lamps.h"
 #include "core/prt/direction_sets.h"
+#include "core/prt/flat_lamps.h"
 #include "core/prt/transfer_point.h"
 #include "core/scene/environment.h"
 #include "core/trace/environment_sampler.h"

@@ -9,6 +9,7 @@
 #include "core/base/random.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
+#include "core/sphere/sobol_points.h"
 #include "core/trace/surface.h"
 
 namespace kiln {
@@ -55,12 +56,13 @@ Vec3f Lamps::emitted(const Receiver& at, const EmitterRays& wanted, std::uint64_
   EXPECTS(wanted.reach == 1 || wanted.samples % 16 == 0);
   const int most = wanted.samples * wanted.reach;
   const double cosine = static_cast<double>(cosine_share(wanted.samples)) / wanted.samples;
+  const SobolPoints points(mix64(seed)), directions(mix64(seed + 1));
   Vec3d sum, mean;
   double change = 0;  // squared, of the mean; the last round's, or a half of the one before
   int done = 0;
   for (int end = wanted.reach > 1 ? wanted.samples / 4 : most; done < most; end = std::min(2 * end, most)) {
-    sum += from_points(at, {done, end, cosine}, mix64(seed), rays) +
-           from_rays(at, {cosine_share(done), cosine_share(end), cosine}, mix64(seed + 1));
+    sum += from_points(at, {done, end, cosine}, points, rays) +
+           from_rays(at, {cosine_share(done), cosine_share(end), cosine}, directions);
     rays += static_cast<std::uint64_t>(cosine_share(end) - cosine_share(done));
     const Vec3d step = sum / end - std::exchange(mean, sum / end);
     change = done == 0 ? 0 : std::max(dot(step, step), change / 4);
@@ -70,7 +72,7 @@ Vec3f Lamps::emitted(const Receiver& at, const EmitterRays& wanted, std::uint64_
   return to_float(mean);
 }
 
-Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t seed, std::uint64_t& sent) const {
+Vec3d Lamps::from_points(const Receiver& at, const Round& round, const SobolPoints& points, std::uint64_t& sent) const {
   const Vec3d origin = to_double(at.origin), normal = to_double(at.normal);
   Vec3d sum;
   Rays16 rays;
@@ -85,16 +87,17 @@ Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t s
     sent += std::exchange(lanes, 0);
   };
   for (auto index = static_cast<std::uint32_t>(round.first); index < static_cast<std::uint32_t>(round.last); ++index) {
-    // One stratified pair: the first number picks the triangle, what is left of it and the second a point there.
-    const Vec2f u = sobol_owen(index, seed), v = sobol_owen(index, ~seed);
-    const EmitterSample s = emitters_.sample(u.x, {v.x, v.y});
+    const Vec3f u = points[index];
+    const EmitterSample s = emitters_.sample(u.z, {u.x, u.y});
     const Vec3d way = s.position - origin;
-    const double distance = length(way);
-    const Vec3d w = normalized(way);
-    const double cosine = dot(w, normal), facing = s.double_sided ? std::abs(dot(w, s.normal)) : -dot(w, s.normal);
-    if (cosine <= 0 || facing <= 0 || s.radiance == Vec3d{}) continue;
-    const double solid_density = s.density * distance * distance / facing;
-    light[lanes] = s.radiance * (cosine * kInversePi / (solid_density + round.cosine * cosine * kInversePi));
+    const double across = dot(way, normal), along = dot(way, s.normal),
+                 facing = s.double_sided ? std::abs(along) : -along;
+    if (across <= 0 || facing <= 0 || s.radiance == Vec3d{}) continue;
+    const double distance2 = dot(way, way), distance = std::sqrt(distance2);
+    const Vec3d w = way * (1 / distance);
+    const double cosine = across * kInversePi / distance;
+    const double solid_density = s.density * distance2 * distance / facing;
+    light[lanes] = s.radiance * (cosine / (solid_density + round.cosine * cosine));
     set_lane(rays, lanes++, w, distance * kShortfall);
     if (lanes == kPacket) send();
   }
@@ -102,7 +105,7 @@ Vec3d Lamps::from_points(const Receiver& at, const Round& round, std::uint64_t s
   return sum;
 }
 
-Vec3d Lamps::from_rays(const Receiver& at, const Round& round, std::uint64_t seed) const {
+Vec3d Lamps::from_rays(const Receiver& at, const Round& round, const SobolPoints& directions) const {
   const Basis<float> basis = basis_around(at.normal);
   Vec3d sum;
   for (int first = round.first; first < round.last; first += kPacket) {
@@ -112,7 +115,7 @@ Vec3d Lamps::from_rays(const Receiver& at, const Round& round, std::uint64_t see
     std::array<Vec3f, kPacket> local;
     for (int i = 0; i < count; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      local[k] = cosine_hemisphere(sobol_owen(static_cast<std::uint32_t>(first + i), seed));
+      local[k] = cosine_hemisphere(directions.pair(static_cast<std::uint32_t>(first + i)));
       set_lane(rays, k, to_double(basis.to_world(local[k])), kFar);
     }
     Hits16 hits;
@@ -127,7 +130,7 @@ Vec3d Lamps::from_rays(const Receiver& at, const Round& round, std::uint64_t see
       const double solid_density = density * hits.t[i] * hits.t[i] / std::max(facing, 1e-12);
       const double cosine = local[i].z * kInversePi;
       const double weight = cosine / (solid_density + round.cosine * cosine);
-      sum += to_double(emission(hits.triangle[i], hits.u[i], hits.v[i], w)) * weight;
+      sum += to_double(emission(p, w)) * weight;
     }
   }
   return sum;
@@ -135,9 +138,12 @@ Vec3d Lamps::from_rays(const Receiver& at, const Round& round, std::uint64_t see
 
 Vec3f Lamps::emission(std::uint32_t triangle, float u, float v, const Vec3f& direction) const {
   if (emitters_.density(triangle) == 0) return {};
+  return emission(surface_point(tracer_.scene(), triangle, u, v), direction);
+}
+
+Vec3f Lamps::emission(const SurfacePoint& p, const Vec3f& direction) const {
   const Scene& scene = tracer_.scene();
-  const SurfacePoint p = surface_point(scene, triangle, u, v);
-  if (dot(p.geometric_normal, direction) >= 0 && !is_double_sided(scene, triangle)) return {};
+  if (dot(p.geometric_normal, direction) >= 0 && !is_double_sided(scene, p.triangle)) return {};
   return emission_at(scene, p);
 }
 

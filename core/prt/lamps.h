@@ -14,7 +14,9 @@
 #include <cstdint>
 
 #include "core/base/vec.h"
+#include "core/sphere/sobol_points.h"
 #include "core/trace/lights.h"
+#include "core/trace/surface.h"
 #include "core/trace/tracer.h"
 
 namespace kiln {
@@ -54,8 +56,9 @@ class Lamps {
     int first, last;  // samples, of one kind
     double cosine;    // rays for each point on an emitter
   };
-  Vec3d from_points(const Receiver&, const Round&, std::uint64_t seed, std::uint64_t& sent) const;
-  Vec3d from_rays(const Receiver&, const Round&, std::uint64_t seed) const;
+  Vec3d from_points(const Receiver&, const Round&, const SobolPoints&, std::uint64_t& sent) const;
+  Vec3d from_rays(const Receiver&, const Round&, const SobolPoints&) const;
+  Vec3f emission(const SurfacePoint&, const Vec3f& direction) const;
 
   const Tracer& tracer_;
   const EmitterSampler& emitters_;

@@ -123,9 +123,12 @@ EmitterSample EmitterSampler::sample(double pick, const Vec2<double>& u) const {
   const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end() - 1, pick * total_);
   const std::uint32_t triangle = triangles_[static_cast<std::size_t>(found - cumulative_.begin())];
   const Vec2<double> b = uniform_triangle(u);
-  const SurfacePoint p = surface_point(scene_, triangle, static_cast<float>(b.x), static_cast<float>(b.y));
-  return {.position = to_double(p.position),
-          .normal = to_double(p.geometric_normal),
+  const auto& [i, j, k] = scene_.mesh.triangles[triangle];
+  const Vec3d corner = to_double(scene_.mesh.position[i]), one = to_double(scene_.mesh.position[j]) - corner,
+              other = to_double(scene_.mesh.position[k]) - corner;
+  const SurfacePoint p{.triangle = triangle, .u = static_cast<float>(b.x), .v = static_cast<float>(b.y)};
+  return {.position = corner + one * b.x + other * b.y,
+          .normal = normalized(cross(one, other)),
           .radiance = opacity_at(scene_, p) < kOpaqueFrom ? Vec3d{} : to_double(emission_at(scene_, p)),
           .double_sided = material_of(scene_, triangle).double_sided,
           .density = density(triangle)};

@@ -43,6 +43,8 @@ class EmitterSampler {
   explicit EmitterSampler(const Scene&);
 
   bool empty() const { return triangles_.empty(); }
+  /// Those that emit, ascending.
+  const std::vector<std::uint32_t>& triangles() const { return triangles_; }
   /// Sum over the emitters of area times strength: red, green and blue of the emission, about its mean.
   double total_strength() const { return total_; }
   /// `pick` and `u` are uniform in [0, 1). Not for an empty sampler.

@@ -5,6 +5,7 @@
 #include "core/base/random.h"
 #include "core/sphere/sampling.h"
 #include "core/sphere/sh.h"
+#include "core/sphere/sobol_points.h"
 #include "tests/bench/bench.h"
 
 namespace kiln::bench {
@@ -45,5 +46,8 @@ int main() {
   for (const int order : {3, 6, 10}) kiln::bench::measure_order(order);
   float sum = 0;
   kiln::bench::measure("sobol_owen", 0, [&](std::uint32_t i) { sum += kiln::sobol_owen(i, 7).x; });
+  const kiln::SobolPoints points(7);
+  kiln::bench::measure("SobolPoints, a point", 0, [&](std::uint32_t i) { sum += points[i & 0xfff].x; });
+  kiln::bench::measure("SobolPoints, a seed", 0, [&](std::uint32_t i) { sum += kiln::SobolPoints(i)[0].x; });
   return sum < 0;
 }

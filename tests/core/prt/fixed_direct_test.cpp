@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/prt/interreflection.h"
 #include "tests/core/prt/test_scenes.h"
@@ -29,67 +30,22 @@ Scene lamp_scene(float height, float radiance) {
   return scene;
 }
 
-double corner_factor(double a, double b, double c) {
-  const double x = a / c, y = b / c;
-  return (x / std::sqrt(1 + x * x) * std::atan(y / std::sqrt(1 + x * x)) +
-          y / std::sqrt(1 + y * y) * std::atan(x / std::sqrt(1 + y * y))) /
-         (2 * std::numbers::pi);
-}
-
-TEST(FixedDirect, PointUnderALampReceivesItsFormFactor) {
-  for (const float height : {0.3F, 0.1F, 0.01F, 0.001F}) {  // down to nearly touching
-    const Vec3f value = fixed_at(lamp_scene(height, 4), floor_point({0, 0, 0}), 4096);
-    const double expected = 4 * 4 * corner_factor(0.25, 0.25, height);
-    EXPECT_NEAR(value.x / expected, 1, 0.01) << height;  // 1024 cosine rays at worst: 0.3 / 1024^0.5
-    EXPECT_NEAR(value.y, value.x / 2, 1e-5F * value.x);
-    EXPECT_EQ(value.z, 0.0F);
-  }
-}
-
-TEST(FixedDirect, TheMeanOfManySmallRunsHasNoBias) {
-  const Scene scene = lamp_scene(0.05F, 1);
-  double sum = 0;
-  constexpr int kRuns = 400;
-  for (int run = 0; run < kRuns; ++run) {
-    sum += fixed_at(scene, floor_point({0.2F, 0, 0.1F}), 8, static_cast<std::uint64_t>(run)).x;
-  }
-  const double expected = corner_factor(0.45, 0.35, 0.05) + corner_factor(0.05, 0.35, 0.05) +
-                          corner_factor(0.45, 0.15, 0.05) + corner_factor(0.05, 0.15, 0.05);
-  EXPECT_NEAR(sum / kRuns, expected, 0.02 * expected);  // standard error: about 0.15 / sqrt(400)
-}
-
-/// Where samples agree they are all that is taken, with the value of as many; near the lamp's edge more are, and the
-/// error falls.
-TEST(FixedDirect, OnlyPointsWithALargeErrorTakeMoreRays) {
-  const Scene scene = lamp_scene(0.01F, 1);
+TEST(FixedDirect, AFlatLampInTheOpenCostsFewRaysAndAnyOtherItsSamples) {
+  Scene scene = lamp_scene(0.2F, 1);
   Threads threads(1);
-  const Tracer tracer(scene, threads);
-  const auto bake = [&](const std::vector<TransferPoint>& points, const FixedDirect& params, std::uint64_t* rays) {
+  const std::vector<TransferPoint> below{floor_point({0.1F, 0, 0})};
+  const auto bake = [&](const FixedDirect& params) {
     TransferStats stats;
-    const std::vector<Vec3f> out = bake_fixed_direct(tracer, points, params, threads, &stats);
-    if (rays != nullptr) *rays = stats.rays;
-    return out;
+    const Tracer tracer(scene, threads);
+    const float value = bake_fixed_direct(tracer, below, params, threads, &stats)[0].x;
+    return std::pair(value, stats.rays);
   };
-  constexpr std::uint64_t kOfOnePoint = 64 + 16;
-  std::uint64_t rays = 0;
-  const std::vector<TransferPoint> far{floor_point({0.45F, 0, 0.45F})};
-  const FixedDirect plain{.samples = 64, .seed = 3},
-      adaptive{.samples = 64, .seed = 3, .reach = 16, .tolerance = 0.01F};
-  const std::vector<Vec3f> once = bake(far, plain, nullptr), again = bake(far, adaptive, &rays);
-  EXPECT_EQ(rays, kOfOnePoint);
-  EXPECT_NEAR(again[0].x, once[0].x, 1e-6F);  // the same samples, summed in two parts
-
-  std::vector<TransferPoint> edge;
-  for (int i = 0; i < 64; ++i) edge.push_back(floor_point({0.25F, 0, -0.2F + 0.006F * static_cast<float>(i)}));
-  const std::vector<Vec3f> truth = bake(edge, {.samples = 16384, .seed = 9}, nullptr);
-  const auto squared_error = [&](const std::vector<Vec3f>& values) {
-    double sum = 0;
-    for (std::size_t i = 0; i < edge.size(); ++i) sum += std::pow(values[i].x - truth[i].x, 2);
-    return sum;
-  };
-  const double before = squared_error(bake(edge, plain, nullptr)), after = squared_error(bake(edge, adaptive, &rays));
-  EXPECT_GT(rays, 2 * kOfOnePoint * edge.size());
-  EXPECT_LT(after, before / 4);  // half the error: four times the samples, of independent ones
+  const auto [flat, few] = bake({.samples = 256, .reach = 16, .tolerance = 1e-6F});
+  scene.materials.back().alpha_mode = AlphaMode::mask;  // the same lamp, but not a flat one
+  const auto [masked, all] = bake({.samples = 256});
+  EXPECT_EQ(few, 64U);
+  EXPECT_EQ(all, 256U + 64U);
+  EXPECT_NEAR(masked / flat, 1, 0.01);  // 256 stratified samples of a smooth function
 }
 
 TEST(FixedDirect, BackOfASingleSidedLampIsDark) {

@@ -1,10 +1,11 @@
-#include "core/meshless/flat_lamps.h"
+#include "core/prt/flat_lamps.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 
+#include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/prt/morton.h"
@@ -14,6 +15,7 @@ namespace kiln {
 namespace {
 
 constexpr double kShortfall = 1 - 4e-6;  // a shadow ray ends this fraction before its lamp, which would stop it
+constexpr double kLeft = 0.7;            // as of other lamps (lamps.cpp)
 constexpr double kFlat = 1e-6;           // of the unit cube: how far a lamp's triangles may leave its plane
 
 /// One edge's term of Lambert's sum.
@@ -60,14 +62,15 @@ double loop_form_factor(std::span<const Vec3d> loop, const Vec3d& at, const Vec3
 }
 
 std::optional<FlatLamps> FlatLamps::find(const Tracer& tracer) {
+  if (tracer.emitters().empty()) return {};
   const Scene& scene = tracer.scene();
   const Mesh& mesh = scene.mesh;
   FlatLamps out(tracer);
   std::vector<std::uint32_t> part_of;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+  for (const std::uint32_t t : tracer.emitters().triangles()) {
     const Material& material = material_of(scene, t);
-    const Vec3d face = 0.5 * to_double(area_vector(mesh, mesh.triangles[t]));
-    if (material.emission == Vec3f{} || !(length(face) > 0)) continue;
+    const Vec3d face = to_double(area_vector(mesh, mesh.triangles[t]));
+    if (!(length(face) > 0)) continue;
     if (material.emission_texture.texture >= 0 || material.alpha_mode != AlphaMode::opaque) return {};
     const Vec3d place = to_double(mesh.position[mesh.triangles[t][0]]), normal = normalized(face);
     std::size_t l = 0;
@@ -166,7 +169,7 @@ Vec3d FlatLamps::point_of(const Lamp& lamp, const Vec2f& u) const {
          to_double(mesh.position[c]) * uv.y;
 }
 
-void FlatLamps::add_points(const Lamp& lamp, const Receiver& at, int first, int last, std::uint64_t seed,
+void FlatLamps::add_points(const Lamp& lamp, const Receiver& at, int first, int last, const SobolPoints& points,
                            Sums& sums) const {
   const Vec3d origin = to_double(at.origin), n = to_double(at.normal);
   for (int begin = first; begin < last; begin += kPacket) {
@@ -176,14 +179,13 @@ void FlatLamps::add_points(const Lamp& lamp, const Receiver& at, int first, int 
     std::array<double, kPacket> weight{};
     for (int i = 0; i < count; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const Vec3d way = point_of(lamp, sobol_owen(static_cast<std::uint32_t>(begin + i), seed)) - origin;
-      const double distance = length(way);
-      const Vec3d w = normalized(way);
-      const Vec3f direction = to_float(w);
+      const Vec3d way = point_of(lamp, points.pair(static_cast<std::uint32_t>(begin + i))) - origin;
+      const double distance2 = dot(way, way), distance = std::sqrt(distance2);
+      const Vec3f direction = distance > 0 ? to_float(way * (1 / distance)) : Vec3f{};
       rays.dx[k] = direction.x, rays.dy[k] = direction.y, rays.dz[k] = direction.z;
       rays.far[k] = static_cast<float>(distance * kShortfall);
-      const double cosine = std::max(0.0, dot(w, n)), facing = std::abs(dot(w, lamp.normal));
-      if (distance > 0) weight[k] = cosine * facing / (distance * distance);
+      const double cosines = std::max(0.0, dot(way, n)) * std::abs(dot(way, lamp.normal));
+      if (distance > 0) weight[k] = cosines / (distance2 * distance2);
     }
     const std::uint32_t hidden = tracer_->occluded16(rays, count);
     for (int i = 0; i < count; ++i) {
@@ -196,6 +198,25 @@ void FlatLamps::add_points(const Lamp& lamp, const Receiver& at, int first, int 
   }
 }
 
+double FlatLamps::visible_share(const Lamp& lamp, const Receiver& at, const LampRays& budget, std::uint64_t seed,
+                                std::uint64_t& rays) const {
+  EXPECTS(budget.many <= LampRays::kMost);
+  const SobolPoints points(seed);
+  Sums sums;
+  double share = 0, change = 0;  // squared; the last round's, or a half of the one before
+  for (int done = 0, round = 1, end = budget.few; done < end; ++round) {
+    add_points(lamp, at, done, end, points, sums);
+    rays += static_cast<std::uint64_t>(end - done);
+    done = end;
+    const double now = sums.all > 0 ? sums.visible / sums.all : 0, step = now - std::exchange(share, now);
+    if (sums.seen != sums.hidden) break;  // else mixed, or all points lie below the horizon and what rises was missed
+    change = round == 1 ? 0 : std::max(step * step, change / 4);
+    if (budget.tolerance > 0 && round > 2 && kLeft * change / 3 <= double{budget.tolerance} * budget.tolerance) break;
+    end = std::max(done, budget.tolerance > 0 ? std::min(2 * done, budget.many) : budget.many);
+  }
+  return share;
+}
+
 Vec3f FlatLamps::light_at(const Receiver& at, const LampRays& budget, std::uint64_t seed, std::uint64_t& rays) const {
   const Vec3d origin = to_double(at.origin), n = to_double(at.normal);
   Vec3d light;
@@ -205,21 +226,11 @@ Vec3f FlatLamps::light_at(const Receiver& at, const LampRays& budget, std::uint6
     if (side <= 0 && (side == 0 || !lamp.double_sided)) continue;
     double form = 0;
     for (const std::vector<Vec3d>& loop : lamp.outline) form += loop_form_factor(loop, origin, n);
-    if (!(std::abs(form) > 0)) continue;
-
-    Sums sums;
-    const std::uint64_t own = mix64(seed + l);
-    add_points(lamp, at, 0, budget.few, own, sums);
-    int sent = budget.few;
-    // Neither seen nor hidden: all points lie below the horizon, and what rises above it was missed so far.
-    if (budget.many > sent && sums.seen == sums.hidden) {
-      add_points(lamp, at, sent, budget.many, own, sums);
-      sent = budget.many;
-    }
-    rays += static_cast<std::uint64_t>(sent);
-    if (!sums.seen) continue;
-    const double share = std::abs(form) * (sums.visible / sums.all);
-    light += lamp.radiance * share;
+    const Vec3d open = lamp.radiance * std::abs(form);
+    if (!(length(open) > 0)) continue;
+    LampRays own = budget;
+    own.tolerance /= static_cast<float>(length(open) * std::sqrt(static_cast<double>(lamps_.size())));
+    light += open * visible_share(lamp, at, own, mix64(seed + l), rays);
   }
   return to_float(light);
 }
