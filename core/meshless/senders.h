@@ -29,7 +29,7 @@ class Senders {
   static constexpr float kReach = 2;  // of R
 
   /// Keeps references to tracer and points.
-  Senders(const Tracer&, const PointHierarchy&, const PointPlacement&, Threads&);
+  Senders(const Tracer&, const PointHierarchy&, Threads&);
 
   /// Takes in points that were added to the hierarchy behind those known so far: they answer where none did.
   void add_new(Threads&);
@@ -69,6 +69,8 @@ class Senders {
   std::size_t near(const SurfaceSite&, float reach, std::array<Candidate, most>& first) const;
   Search search(const SurfaceSite&) const;
   SurfaceSite site_on(std::uint32_t triangle, float u, float v, bool back) const;
+  /// The site with its group (cover.h), which the two above leave open.
+  SurfaceSite grouped(SurfaceSite) const;
   std::uint32_t cell_at(const Face&, float u, float v) const;
 
   static constexpr std::uint32_t kLook = 0xfffffffeU;  // of a cell: each hit looks for itself
@@ -76,7 +78,7 @@ class Senders {
   const Tracer& tracer_;
   const Scene& scene_;
   const PointHierarchy& points_;
-  bool groups_by_part_, backs_ = false;
+  bool backs_ = false;
   float finest_ = 0;
   PointGrid grid_;
   std::vector<Face> faces_;
