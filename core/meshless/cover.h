@@ -14,8 +14,8 @@ namespace kiln {
 
 inline constexpr std::uint32_t kOpenGroup = 0, kCoveredGroup = 1, kGroups = 2;
 
-/// `cover`: R of the finest level, from which what is above is far. A vertex is asked a twentieth of it inside its face,
-/// clear of edges and of what stands there.
+/// `cover`: R of the finest level, from which what is above is far. A vertex is asked a twentieth of it inside its
+/// face, clear of edges and of what stands there.
 std::uint32_t group_of(const Tracer&, const TransferPoint&, float cover);
 
 /// Where that is: as far inside the face as a reader looks from.

@@ -343,9 +343,9 @@ class Solver {
   const Tracer& tracer_;
   const Radiosity& params_;
   Threads& threads_;
-  DirectLight light_, rough_light_;       // at vertices, at points
-  std::vector<TransferPoint> vertices_;   // and the other places
-  std::vector<SurfaceSite> sites_;        // of the points
+  DirectLight light_, rough_light_;      // at vertices, at points
+  std::vector<TransferPoint> vertices_;  // and the other places
+  std::vector<SurfaceSite> sites_;       // of the points
   std::vector<TransferPoint> at_;
   std::optional<GatherRows> rows_;       // of the receivers, then of `alone_`
   std::vector<Vec3f> direct_;            // at the points

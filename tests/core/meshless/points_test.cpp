@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/meshless/cover.h"
 #include "core/mesh/topology.h"
+#include "core/meshless/cover.h"
 #include "core/sphere/sampling.h"
 #include "tests/core/prt/test_scenes.h"
 
