@@ -7,6 +7,9 @@
 //         normals, of others the front. A point whose normal's ray first meets a back is taken to be inside a solid and
 //         refused. On the first `both_sides` levels double-sided faces have points on their backs as well; then only
 //         the back of a single-sided face tells the inside of a solid.
+// Gaps    (cover.h) are groups of their own: there, too, only the back of a single-sided face refuses a point, and
+//         covered backs of double-sided faces have points on all levels. Which triangles may be covered is known from
+//         one look for each R^2 of the finest level; what that misses is left to demand.h.
 // Differs A level ends after a number of proposals that follows from the area: kProposals A / R^2. The paper waits for
 //         1000 rejections in a row, which takes seconds on fine levels and no known time on crumpled surfaces. Of a
 //         smooth surface .5 % is then farther than R from every point and nothing farther than 1.5 R (measured).
