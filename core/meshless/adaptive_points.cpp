@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/base/expects.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/point_grid.h"
 #include "core/meshless/reading.h"
 #include "core/prt/morton.h"
@@ -51,10 +52,9 @@ class Refinement {
   Readings predict(std::uint32_t begin, std::uint32_t end) const {
     std::vector<SurfaceSite> sites;
     for (const std::uint32_t p : out_) sites.push_back(points_.points[p].site);
-    std::vector<Readings::Place> places;
-    for (std::uint32_t p = begin; p < end; ++p)
-      places.push_back({transfer_point(points_.points[p]), points_.points[p].site.group});
-    return {{params_.tracer, sites, params_.neighbours, threads_}, places, threads_};
+    std::vector<TransferPoint> places;
+    for (std::uint32_t p = begin; p < end; ++p) places.push_back(transfer_point(points_.points[p]));
+    return {{params_.tracer, {sites, points_.cover, params_.neighbours}, threads_}, places, threads_};
   }
 
   void choose(std::size_t before, std::size_t level, const std::optional<Readings>& predicted, const Readings& seen,
@@ -62,7 +62,7 @@ class Refinement {
     const std::uint32_t begin = points_.begin(level);
     for (const std::uint32_t p : children_of(mispredicted(before, level - 1, predicted), level)) chosen[p - begin] = 1;
     for (std::size_t i = 0; i < chosen.size(); ++i) {
-      if (!seen.any(i)) chosen[i] = 1;
+      if (!seen.any(i) || points_.points[begin + i].site.group == kCoveredGroup) chosen[i] = 1;
     }
   }
 

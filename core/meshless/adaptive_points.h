@@ -3,6 +3,7 @@
 //   1. the first levels everywhere, and points that were asked for (demand.h)
 //   2. of a finer level the points around those of the level above that are not what the points before predict there,
 //      and those that see none which was computed
+//   3. all of those in gaps (cover.h): there light changes over less than points are apart
 // A prediction is read from all points computed so far (reading.h).
 // Paper   Lehtinen et al. 2007, sections 6.3 and 6.4: RECEIVER-ORACLE.
 // Differs the paper asks on the coarsest level for the variation among neighbours, on finer ones for the coefficient.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/random.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/in_sight.h"
 #include "core/meshless/point_grid.h"
 #include "core/prt/direction_sets.h"
@@ -12,7 +13,6 @@ namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 128;
-constexpr float kInside = 0.05F;  // of R
 
 using Asked = std::vector<MeshlessPoint>;
 
@@ -28,23 +28,23 @@ Asked collect(std::size_t count, Threads& threads, const F& ask) {
   return out;
 }
 
-Asked asked_by_readers(const Demand& demand, const Senders& senders, float radius, Threads& threads) {
+Asked asked_by_readers(const Demand& demand, const Senders& senders, float cover, Threads& threads) {
   return collect(demand.readers.size(), threads, [&](std::size_t i, Asked& out) {
-    const SurfaceSite site = reader_site(demand.readers[i], radius);
+    const SurfaceSite site = reader_site(demand.tracer, demand.readers[i], cover);
     if (senders.nearest(site) != Senders::kNone) return;
-    out.push_back({.site = site, .face_normal = demand.readers[i].point.face_normal, .triangle = kNoFace});
+    out.push_back({.site = site, .face_normal = demand.readers[i].face_normal, .triangle = kNoFace});
   });
 }
 
 /// What the rays of points `first` and on meet.
 Asked asked_by_rays(const Demand& demand, const PointHierarchy& points, const Senders& senders, std::size_t first,
                     Threads& threads) {
-  const std::uint64_t seed = mix64(demand.placement.seed ^ 0x64656d616e64ULL);
+  const std::uint64_t seed = mix64(demand.seed ^ 0x64656d616e64ULL);
   const DirectionSets sets(0, kDemandRays, 64, seed);
   return collect(points.points.size() - first, threads, [&](std::size_t i, Asked& out) {
-    const TransferPoint p = transfer_point(points.points[first + i]);
-    const LocalFrame frame = local_frame(sets, p.normal, seed, point_key(p));
-    const Vec3f origin = ray_origin(p);
+    const TransferPoint from = transfer_point(points.points[first + i]);
+    const LocalFrame frame = local_frame(sets, from.normal, seed, point_key(from));
+    const Vec3f origin = ray_origin(from);
     Rays16 rays;
     Hits16 hits;
     rays.ox.fill(origin.x), rays.oy.fill(origin.y), rays.oz.fill(origin.z), rays.far.fill(kFar);
@@ -58,19 +58,16 @@ Asked asked_by_rays(const Demand& demand, const PointHierarchy& points, const Se
       const float u = hits.u[k], v = hits.v[k];
       const bool back = side == HitSide::flipped;
       if ((back ? senders.behind(triangle, u, v) : senders.at(triangle, u, v)) != Senders::kNone) continue;
-      out.push_back(point_on(demand.tracer.scene(), triangle, {u, v}, demand.placement.groups_by_part, back));
+      MeshlessPoint& p = out.emplace_back(point_on(demand.tracer.scene(), triangle, {u, v}, back));
+      p.site.group = group_of(demand.tracer, transfer_point(p), points.cover);
     }
   });
 }
 
 }  // namespace
 
-SurfaceSite reader_site(const Readings::Place& reader, float radius) {
-  const TransferPoint& p = reader.point;
-  const Vec3f way = p.inward - p.position;
-  const float far = length(way);
-  const Vec3f place = far > 0 ? p.position + way * std::min(1.0F, kInside * radius / far) : p.position;
-  return {place, p.normal, reader.group};
+SurfaceSite reader_site(const Tracer& tracer, const TransferPoint& p, float cover) {
+  return {inside_face(p, cover), p.normal, group_of(tracer, p, cover)};
 }
 
 void add_demanded(const Demand& demand, PointHierarchy& points, Senders& senders, Threads& threads) {
@@ -79,7 +76,7 @@ void add_demanded(const Demand& demand, PointHierarchy& points, Senders& senders
   const float radius = points.radius.back();
   std::size_t first = 0;  // whose rays ask
   for (int round = 0; round < kDemandRounds; ++round) {
-    Asked asked = round == 0 ? asked_by_readers(demand, senders, radius, threads) : Asked{};
+    Asked asked = round == 0 ? asked_by_readers(demand, senders, points.cover, threads) : Asked{};
     const Asked met = asked_by_rays(demand, points, senders, first, threads);
     asked.insert(asked.begin(), met.begin(), met.end());
     first = points.points.size();

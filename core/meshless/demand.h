@@ -20,16 +20,16 @@
 
 namespace kiln {
 
-/// Where a reader looks from: a twentieth of R inside its face, clear of edges that hide what is beside them.
-SurfaceSite reader_site(const Readings::Place&, float radius);
+/// Where a reader looks from: a little inside its face (cover.h), clear of edges that hide what is beside them.
+SurfaceSite reader_site(const Tracer&, const TransferPoint&, float cover);
 
 inline constexpr int kDemandRays = kPacket, kDemandRounds = 3;
 
 struct Demand {
   const Tracer& tracer;
   const GatherFaces& faces;
-  PointPlacement placement;
-  std::span<const Readings::Place> readers;
+  std::uint64_t seed = 0;
+  std::span<const TransferPoint> readers;
   std::size_t most = 0;  // points in all; 0: twice as many as were placed
 };
 

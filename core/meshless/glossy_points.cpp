@@ -194,9 +194,7 @@ class Solver {
 
   void read_vertices() {
     const std::vector<TransferPoint> places = lit_places(tracer_.scene().mesh, vertices_, params_.bake.stand_ins);
-    std::vector<Readings::Place> readers;
-    for (const TransferPoint& p : places) readers.push_back({p, 0});
-    const Readings readings({tracer_, sites_, params_.neighbours, threads_}, readers, threads_);
+    const Readings readings({tracer_, {sites_, points_.cover, params_.neighbours}, threads_}, places, threads_);
 
     std::vector<TransferPoint> own;
     std::vector<std::size_t> own_row(places.size(), 0);  // of those that see no point

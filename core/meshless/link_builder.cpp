@@ -17,6 +17,7 @@ constexpr int kMostLoneRays = 256;  // of a vertex that gathers for itself: scen
 
 PointHierarchy coarse_part(const PointHierarchy& all, std::size_t levels) {
   PointHierarchy out;
+  out.cover = all.cover;
   if (levels == 0) return out;
   const auto points = static_cast<std::ptrdiff_t>(all.level_end[levels - 1]);
   out.points.assign(all.points.begin(), all.points.begin() + points);
@@ -60,13 +61,10 @@ LinkBuilder::Work::Work(const Tracer& t, const LinkParams& p, Threads& threads)
 
 void LinkBuilder::Work::ask_for_senders(Threads& threads) {
   const std::size_t placed = coarse.points.size(), levels = coarse.levels();
-  senders.emplace(tracer, coarse, placement, threads);
+  senders.emplace(tracer, coarse, threads);
   const std::vector<TransferPoint> vertices = vertex_points(tracer.scene().mesh);
-  const std::vector<std::uint32_t> group = groups_of(tracer.scene().mesh);
-  std::vector<Readings::Place> readers;
-  for (std::size_t v = 0; v < vertices.size(); ++v) readers.push_back({vertices[v], group[v]});
   const std::size_t most = std::min<std::size_t>(std::max<std::size_t>(2 * placed, params.most_senders), kMostSenders);
-  add_demanded({tracer, faces, placement, readers, most}, coarse, *senders, threads);
+  add_demanded({tracer, faces, placement.seed, vertices, most}, coarse, *senders, threads);
   stats.senders = static_cast<std::uint32_t>(coarse.points.size());
   if (!coarse.demanded) return;
   const std::size_t added = coarse.points.size() - placed;
@@ -194,7 +192,7 @@ void LinkBuilder::Work::begin_reading(Threads& threads) {
   read_row = readable(all.levels());
   std::vector<LinkReading::Receiver> receivers;
   for (const std::uint32_t r : read_row) receivers.push_back({all.points[receiver[r]].site, link_row[r]});
-  reading.emplace(tracer, receivers, params.neighbours, threads);
+  reading.emplace(tracer, LinkReading::Points{receivers, all.cover, params.neighbours}, threads);
 }
 
 LinkBuilder::LinkBuilder(const Tracer& tracer, const LinkParams& params, Threads& threads) {

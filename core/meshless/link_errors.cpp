@@ -16,7 +16,7 @@ LinkErrors LinkBuilder::Work::errors_at(std::span<const TransferPoint> places, T
   std::vector<std::uint32_t> rows, points;
   std::vector<double> spread;  // the variance of what a place reads, of that of one row
   for (const TransferPoint& place : places) {
-    const Reading::Seen near = reading->seen(place, 0);
+    const Reading::Seen near = reading->seen(place);
     const BasisTerm* most = nullptr;
     double squares = 0;
     for (const BasisTerm& t : near.terms) {
@@ -56,7 +56,7 @@ std::vector<std::vector<RowTerm>> LinkBuilder::readings_at(std::span<const Trans
   std::vector<std::vector<RowTerm>> out(places.size());
   if (!work_->reading) return out;
   threads.for_blocks(places.size(), Work::kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) out[i] = work_->reading->rows(places[i], 0);
+    for (std::size_t i = begin; i < end; ++i) out[i] = work_->reading->rows(places[i]);
   });
   return out;
 }

@@ -14,13 +14,13 @@ std::vector<SurfaceSite> sites_of(const std::vector<LinkReading::Receiver>& rece
 
 }  // namespace
 
-LinkReading::LinkReading(const Tracer& tracer, const std::vector<Receiver>& receivers, int neighbours, Threads& threads)
-    : reading_(tracer, sites_of(receivers), neighbours, threads) {
-  for (const Receiver& r : receivers) row_.push_back(r.row);
+LinkReading::LinkReading(const Tracer& tracer, const Points& points, Threads& threads)
+    : reading_(tracer, {sites_of(points.receivers), points.cover, points.neighbours}, threads) {
+  for (const Receiver& r : points.receivers) row_.push_back(r.row);
 }
 
-std::vector<RowTerm> LinkReading::rows(const TransferPoint& p, std::uint32_t group) const {
-  Reading::Seen near = seen(p, group);
+std::vector<RowTerm> LinkReading::rows(const TransferPoint& p) const {
+  Reading::Seen near = seen(p);
   std::vector<RowTerm> out;
   std::sort(near.terms.begin(), near.terms.end(), [](const BasisTerm& a, const BasisTerm& b) {
     return a.value != b.value ? a.value > b.value : a.function < b.function;

@@ -19,13 +19,18 @@ class LinkReading {
     std::uint32_t row;
   };
 
-  /// Keeps a reference to the tracer. `neighbours` around each receiver set how far it is read.
-  LinkReading(const Tracer&, const std::vector<Receiver>&, int neighbours, Threads&);
+  struct Points {
+    const std::vector<Receiver>& receivers;
+    float cover = 0;
+    int neighbours = 10;
+  };
+  /// Keeps a reference to the tracer. The rest is as in reading.h.
+  LinkReading(const Tracer&, const Points&, Threads&);
 
-  Reading::Seen seen(const TransferPoint& p, std::uint32_t group) const { return reading_.at(p, group); }
+  Reading::Seen seen(const TransferPoint& p) const { return reading_.at(p); }
 
   /// The same as rows and weights in 255ths that sum to 255, of which the smallest are left out.
-  std::vector<RowTerm> rows(const TransferPoint&, std::uint32_t group) const;
+  std::vector<RowTerm> rows(const TransferPoint&) const;
 
  private:
   std::vector<std::uint32_t> row_;

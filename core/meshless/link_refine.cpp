@@ -123,7 +123,7 @@ std::vector<float> LinkBuilder::Work::probe_light(std::span<const TransferPoint>
   if (probes() == 0) return out;
   threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Reading::Seen near = reading->seen(places[i], 0);
+      const Reading::Seen near = reading->seen(places[i]);
       std::vector<float> light(probes());
       for (const BasisTerm& t : near.terms) {
         const std::size_t first = read_row[t.function] * probes();

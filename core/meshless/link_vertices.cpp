@@ -15,12 +15,11 @@ LightLinks LinkBuilder::Work::finish(const Mesh& mesh, Threads& threads) {
   }
   const std::vector<bool> dark;
   for (const StandIn& s : find_stand_ins(mesh, dark, hidden_test(tracer), threads)) vertices[s.vertex] = s.point;
-  const std::vector<std::uint32_t> group = groups_of(mesh);
   std::vector<std::vector<RowTerm>> terms(vertices.size());
   threads.for_blocks(vertices.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) terms[v] = reading->rows(vertices[v], group[v]);
+    for (std::size_t v = begin; v < end; ++v) terms[v] = reading->rows(vertices[v]);
   });
-  read_nearest(vertices, group, terms);
+  read_nearest(vertices, terms);
   std::swap(links, out);
   add_lone(vertices, terms, threads);
   std::swap(links, out);
@@ -32,7 +31,6 @@ LightLinks LinkBuilder::Work::finish(const Mesh& mesh, Threads& threads) {
 }
 
 void LinkBuilder::Work::read_nearest(const std::vector<TransferPoint>& vertices,
-                                     const std::vector<std::uint32_t>& group,
                                      std::vector<std::vector<RowTerm>>& terms) const {
   std::vector<std::uint32_t> row_of(coarse.points.size(), kUnread);
   for (std::size_t r = 0; r < receiver.size(); ++r) {
@@ -40,7 +38,7 @@ void LinkBuilder::Work::read_nearest(const std::vector<TransferPoint>& vertices,
   }
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     if (!terms[v].empty()) continue;
-    const std::uint32_t s = senders->nearest(reader_site({vertices[v], group[v]}, coarse.radius.back()));
+    const std::uint32_t s = senders->nearest(reader_site(tracer, vertices[v], coarse.cover));
     if (s != Senders::kNone && row_of[s] != kUnread) terms[v] = {{row_of[s], 255}};
   }
 }
@@ -71,15 +69,6 @@ void LinkBuilder::Work::add_lone(const std::vector<TransferPoint>& vertices, std
   std::vector<std::uint32_t> every(places.size());
   for (std::uint32_t i = 0; i < every.size(); ++i) every[i] = i;
   make_links({*lone_rows, 0, places, params.oracle, every}, threads);
-}
-
-std::vector<std::uint32_t> LinkBuilder::Work::groups_of(const Mesh& mesh) const {
-  std::vector<std::uint32_t> group(mesh.position.size(), 0);
-  if (!placement.groups_by_part) return group;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::uint32_t v : mesh.triangles[t]) group[v] = mesh.part[t];
-  }
-  return group;
 }
 
 }  // namespace kiln

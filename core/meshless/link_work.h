@@ -91,11 +91,9 @@ struct LinkBuilder::Work {
 
   LightLinks finish(const Mesh& mesh, Threads&);
   /// Vertices that see no receiver well enough take what the nearest sender receives.
-  void read_nearest(const std::vector<TransferPoint>& vertices, const std::vector<std::uint32_t>& group,
-                    std::vector<std::vector<RowTerm>>& terms) const;
+  void read_nearest(const std::vector<TransferPoint>& vertices, std::vector<std::vector<RowTerm>>& terms) const;
   /// Rows for vertices that see no point at all; one does for those that see each other within the finest R.
   void add_lone(const std::vector<TransferPoint>& vertices, std::vector<std::vector<RowTerm>>& terms, Threads&);
-  std::vector<std::uint32_t> groups_of(const Mesh& mesh) const;
 
   void begin_stage(std::string_view name) const {
     if (params.stage) params.stage(name);

@@ -17,9 +17,9 @@ LitSurface::LitSurface(const Tracer& tracer, const Environment* sky, const Point
       albedo_(tracer.scene()),
       path_light_(tracer, sky, kOnPaths),
       points_(place_points(tracer, faces_, points.placement, threads)),
-      senders_(tracer, points_, points.placement, threads),
+      senders_(tracer, points_, threads),
       paths_({tracer_, faces_, albedo_, senders_, &path_light_}) {
-  add_demanded({tracer, faces_, points.placement, points.readers}, points_, senders_, threads);
+  add_demanded({tracer, faces_, points.placement.seed, points.readers}, points_, senders_, threads);
   light_.resize(points_.points.size());
 }
 

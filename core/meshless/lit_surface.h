@@ -9,7 +9,6 @@
 
 #include "core/base/threads.h"
 #include "core/meshless/points.h"
-#include "core/meshless/reading.h"
 #include "core/meshless/sender_paths.h"
 #include "core/scene/environment.h"
 
@@ -19,7 +18,7 @@ class LitSurface {
  public:
   struct Points {
     PointPlacement placement;
-    std::span<const Readings::Place> readers;  // places that ask for points (demand.h)
+    std::span<const TransferPoint> readers;  // places that ask for points (demand.h)
   };
   /// Keeps references to the tracer and to `sky`, which may be null. Places the senders; they are dark.
   LitSurface(const Tracer&, const Environment* sky, const Points&, Threads&);

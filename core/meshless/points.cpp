@@ -1,11 +1,15 @@
 #include "core/meshless/points.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/point_grid.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -17,18 +21,23 @@ constexpr double kPointsPerDisk = 0.7;  // A / R^2 of a full level times this is
 constexpr double kFewestWanted = 8192, kMostWanted = 262144;
 constexpr int kAutoLevels = 5;
 
-/// 0 where the triangle gets no points.
-double area_of(const Mesh& mesh, const PointPlacement& placement, std::size_t t) {
-  return placement.parts.empty() || placement.parts[mesh.part[t]] ? triangle_area(mesh, mesh.triangles[t]) : 0.0;
+/// Of each triangle; 0 where it gets no points.
+std::vector<double> areas_of(const Mesh& mesh, const PointPlacement& placement) {
+  std::vector<double> out;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const bool wanted = placement.parts.empty() || placement.parts[mesh.part[t]];
+    out.push_back(wanted ? triangle_area(mesh, mesh.triangles[t]) : 0.0);
+  }
+  return out;
 }
 
 /// Triangles by area, in constant time: a guide table into the running sum.
 class AreaSampler {
  public:
-  AreaSampler(const Mesh& mesh, const PointPlacement& placement) {
+  explicit AreaSampler(std::span<const double> areas) {
     double sum = 0;
-    cumulative_.reserve(mesh.triangles.size());
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) cumulative_.push_back(sum += area_of(mesh, placement, t));
+    cumulative_.reserve(areas.size());
+    for (const double area : areas) cumulative_.push_back(sum += area);
     guide_.reserve(cumulative_.size());
     std::uint32_t t = 0;
     for (std::size_t i = 0; i < cumulative_.size(); ++i) {
@@ -57,25 +66,100 @@ bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
 }
 
-/// Equation 1.
-bool has_room(const PointGrid& grid, const std::vector<MeshlessPoint>& points, const SurfaceSite& at, float radius) {
-  bool room = true;
+/// Equation 1: whether a site would have room, for each group.
+std::array<bool, kGroups> rooms(const PointGrid& grid, const std::vector<MeshlessPoint>& points, const SurfaceSite& at,
+                                float radius) {
+  std::array<bool, kGroups> room;
+  room.fill(true);
   grid.near(at.position, radius, [&](std::uint32_t id, float d2) {
     const SurfaceSite& q = points[id].site;
     const float reach = radius * std::max(0.0F, dot(q.normal, at.normal));
-    if (q.group == at.group && d2 < reach * reach) room = false;
+    if (d2 < reach * reach) room[q.group] = false;
   });
   return room;
 }
+
+/// Barycentrics that are uniform by area where (a, b) is uniform.
+Vec2f even_uv(double a, double b) {
+  const Vec2<double> uv = uniform_triangle({a, b});
+  return {static_cast<float>(uv.x), static_cast<float>(uv.y)};
+}
+
+/// Areas of the triangles that are covered somewhere on the given side, as far as one look for each R^2 tells; 0 of the
+/// others, and of backs that are dark.
+std::vector<double> covered_areas(const Tracer& tracer, std::vector<double> areas, float cover, bool behind) {
+  const Scene& scene = tracer.scene();
+  constexpr int kMostLooks = 1 << 16;
+  for (std::uint32_t t = 0; t < areas.size(); ++t) {
+    if (behind && !is_double_sided(scene, t)) areas[t] = 0;
+    const int looks = static_cast<int>(std::min<double>(kMostLooks, std::ceil(areas[t] / (double{cover} * cover))));
+    bool any = false;
+    for (int k = 0; k < looks && !any; ++k) {
+      const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(t));
+      const MeshlessPoint p = point_on(scene, t, even_uv(u.x, u.y), behind);
+      any = group_of(tracer, transfer_point(p), cover) == kCoveredGroup;
+    }
+    if (!any) areas[t] = 0;
+  }
+  return areas;
+}
+
+/// One level in the making: proposals are kept where there is room.
+class Level {
+ public:
+  struct Surface {
+    const Tracer& tracer;
+    const GatherFaces& faces;
+    bool two_sided;
+    std::span<const double> covered;  // areas of triangles whose fronts are covered somewhere
+  };
+  Level(const Surface& surface, PointHierarchy& out, float radius)
+      : surface_(surface), out_(out), radius_(radius), grid_(2 * radius) {
+    for (std::uint32_t i = 0; i < out.points.size(); ++i) grid_.add(i, out.points[i].site.position);
+  }
+
+  enum class Side { front, both, covered_back };
+  void propose(const AreaSampler& triangles, Side side, Random random, Threads& threads) {
+    const double wanted = (side == Side::both ? 2 : 1) * kProposals * triangles.total() / (double{radius_} * radius_);
+    const auto proposals = static_cast<std::uint64_t>(std::ceil(wanted)) + kProposals;
+    for (std::uint64_t k = 0; k < proposals; ++k) {
+      if (k % 4096 == 0) threads.check();
+      const std::uint32_t triangle = triangles.pick(random.uniform_double());
+      const double a = random.uniform_double(), b = random.uniform_double();
+      const Vec2f uv = even_uv(a, b);
+      const bool behind =
+          side == Side::covered_back ||
+          (side == Side::both && is_double_sided(surface_.tracer.scene(), triangle) && random.uniform() < 0.5F);
+      consider(point_on(surface_.tracer.scene(), triangle, uv, behind), side);
+    }
+  }
+
+ private:
+  void consider(MeshlessPoint p, Side side) {
+    const bool may_be_covered = side != Side::front || surface_.covered[p.triangle] > 0;
+    const std::array<bool, kGroups> room = rooms(grid_, out_.points, p.site, radius_);
+    if (!(may_be_covered && room[kCoveredGroup]) && (side == Side::covered_back || !room[kOpenGroup])) return;
+    p.site.group = group_of(surface_.tracer, transfer_point(p), out_.cover);
+    const bool covered = p.site.group == kCoveredGroup;
+    if (!room[p.site.group] || (side == Side::covered_back && !covered)) return;
+    if (is_enclosed(surface_.tracer, surface_.faces, transfer_point(p), surface_.two_sided || covered)) return;
+    grid_.add(static_cast<std::uint32_t>(out_.points.size()), p.site.position);
+    out_.points.push_back(p);
+  }
+
+  const Surface& surface_;
+  PointHierarchy& out_;
+  float radius_;
+  PointGrid grid_;
+};
 
 }  // namespace
 
 double expected_points(double area, double radius) { return kPointsPerDisk * area / (radius * radius); }
 
 double placed_area(const PointPlacement& placement, const Scene& scene) {
-  double sum = 0;
-  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) sum += area_of(scene.mesh, placement, t);
-  return sum;
+  const std::vector<double> areas = areas_of(scene.mesh, placement);
+  return std::accumulate(areas.begin(), areas.end(), 0.0);
 }
 
 PointPlacement resolve(const PointPlacement& asked, const Scene& scene) {
@@ -104,13 +188,12 @@ bool is_enclosed(const Tracer& tracer, const GatherFaces& faces, const TransferP
   return both_sides ? side == HitSide::dark : side != HitSide::front;
 }
 
-MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2f& uv, bool groups_by_part, bool behind) {
+MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2f& uv, bool behind) {
   const Mesh& mesh = scene.mesh;
   const Triangle& t = mesh.triangles[triangle];
   const float u = uv.x, v = uv.y, w = 1 - u - v;
   MeshlessPoint p{.triangle = triangle, .u = u, .v = v};
   p.site.position = mesh.position[t[0]] * w + mesh.position[t[1]] * u + mesh.position[t[2]] * v;
-  p.site.group = groups_by_part ? mesh.part[triangle] : 0;
   p.face_normal = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
   const Vec3f shading = mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]];
   if (is_double_sided(scene, triangle) && dot(p.face_normal, shading) < 0) p.face_normal = -p.face_normal;
@@ -129,33 +212,24 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
   const Scene& scene = tracer.scene();
   const PointPlacement params = resolve(asked, scene);
   EXPECTS(params.levels <= kMaxPointLevels && std::isfinite(params.radius));
-  const AreaSampler triangles(scene.mesh, params);
-  const bool two_sided = params.both_sides > 0;
+  const std::vector<double> areas = areas_of(scene.mesh, params);
+  const AreaSampler triangles(areas);
   PointHierarchy out;
   if (!(triangles.total() > 0)) return out;
-  EXPECTS(expected_points(triangles.total(), std::ldexp(params.radius, 1 - params.levels)) < 0x1p31);
+  out.cover = std::ldexp(params.radius, 1 - params.levels);
+  EXPECTS(expected_points(triangles.total(), out.cover) < 0x1p31);
+  const AreaSampler backs(covered_areas(tracer, areas, out.cover, true));
+  const std::vector<double> covered = covered_areas(tracer, areas, out.cover, false);
+  const Level::Surface surface{tracer, faces, params.both_sides > 0, covered};
 
   float radius = params.radius;
-  for (int level = 0; level < params.levels; ++level, radius *= 0.5F) {
-    PointGrid grid(2 * radius);
-    for (std::uint32_t i = 0; i < out.points.size(); ++i) grid.add(i, out.points[i].site.position);
-    Random random(params.seed, static_cast<std::uint64_t>(level));
-    const bool both = level < params.both_sides;
-    const double wanted = (both ? 2 : 1) * kProposals * triangles.total() / (double{radius} * radius);
-    const auto proposals = static_cast<std::uint64_t>(std::ceil(wanted)) + kProposals;
-    for (std::uint64_t k = 0; k < proposals; ++k) {
-      if (k % 4096 == 0) threads.check();
-      const std::uint32_t triangle = triangles.pick(random.uniform_double());
-      const double a = random.uniform_double(), b = random.uniform_double();
-      const Vec2<double> uv = uniform_triangle({a, b});
-      const bool behind = both && is_double_sided(scene, triangle) && random.uniform() < 0.5F;
-      const MeshlessPoint p = point_on(scene, triangle, {static_cast<float>(uv.x), static_cast<float>(uv.y)},
-                                       params.groups_by_part, behind);
-      if (!has_room(grid, out.points, p.site, radius)) continue;
-      if (is_enclosed(tracer, faces, transfer_point(p), two_sided)) continue;
-      grid.add(static_cast<std::uint32_t>(out.points.size()), p.site.position);
-      out.points.push_back(p);
-    }
+  for (int i = 0; i < params.levels; ++i, radius *= 0.5F) {
+    Level level(surface, out, radius);
+    const bool both = i < params.both_sides;
+    const auto stream = static_cast<std::uint64_t>(i);
+    level.propose(triangles, both ? Level::Side::both : Level::Side::front, Random(params.seed, stream), threads);
+    if (!both && backs.total() > 0)
+      level.propose(backs, Level::Side::covered_back, Random(params.seed, stream, 1), threads);
     out.level_end.push_back(static_cast<std::uint32_t>(out.points.size()));
     out.radius.push_back(radius);
   }

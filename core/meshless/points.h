@@ -7,6 +7,9 @@
 //         normals, of others the front. A point whose normal's ray first meets a back is taken to be inside a solid and
 //         refused. On the first `both_sides` levels double-sided faces have points on their backs as well; then only
 //         the back of a single-sided face tells the inside of a solid.
+// Gaps    (cover.h) are groups of their own: there, too, only the back of a single-sided face refuses a point, and
+//         covered backs of double-sided faces have points on all levels. Which triangles may be covered is known from
+//         one look for each R^2 of the finest level; what that misses is left to demand.h.
 // Differs A level ends after a number of proposals that follows from the area: kProposals A / R^2. The paper waits for
 //         1000 rejections in a row, which takes seconds on fine levels and no known time on crumpled surfaces. Of a
 //         smooth surface .5 % is then farther than R from every point and nothing farther than 1.5 R (measured).
@@ -27,7 +30,7 @@ namespace kiln {
 /// A place with a side: where functions are asked for.
 struct SurfaceSite {
   Vec3f position, normal;   // unit-cube coordinates; unit shading normal
-  std::uint32_t group = 0;  // functions of one group do not reach into another
+  std::uint32_t group = 0;  // in a gap or not (cover.h): functions of one group do not reach into the other
 };
 
 struct MeshlessPoint {
@@ -44,7 +47,6 @@ struct PointPlacement {
   int levels = 0;                // 0: auto
   std::uint64_t wanted = 0;      // points on all levels where the radius is auto; 0: auto
   int both_sides = 0;            // levels with points on both sides of double-sided faces
-  bool groups_by_part = false;   // each part is a reconstruction group of its own; else the scene is one
   std::vector<bool> parts = {};  // of the scene, those that get points; empty: all
   std::uint64_t seed = 0;
 };
@@ -56,6 +58,7 @@ struct PointHierarchy {
   std::vector<MeshlessPoint> points;     // level by level
   std::vector<std::uint32_t> level_end;  // level i has the points level_end[i - 1] .. level_end[i] - 1
   std::vector<float> radius;             // R of each level
+  float cover = 0;                       // R of the finest: what is nearer above a place covers it (cover.h)
 
   bool demanded = false;  // the last level is one of points that were asked for (demand.h)
 
@@ -76,8 +79,9 @@ double placed_area(const PointPlacement&, const Scene&);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
 
-/// The point of a triangle at barycentrics (u, v) of corners 1 and 2; `behind`: on the back of the face.
-MeshlessPoint point_on(const Scene&, std::uint32_t triangle, const Vec2f& uv, bool groups_by_part, bool behind);
+/// The point of a triangle at barycentrics (u, v) of corners 1 and 2, of no group yet; `behind`: on the back of the
+/// face.
+MeshlessPoint point_on(const Scene&, std::uint32_t triangle, const Vec2f& uv, bool behind);
 
 /// Whether the first thing in the direction of the normal is a back (`both_sides`: of a single-sided face): the site is
 /// inside a solid.

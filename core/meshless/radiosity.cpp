@@ -6,6 +6,7 @@
 #include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/meshless/anderson.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/demand.h"
 #include "core/meshless/gather_rows.h"
 #include "core/meshless/point_grid.h"
@@ -38,11 +39,7 @@ class Solver {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     vertices_.insert(vertices_.end(), params.places.begin(), params.places.end());
     begin_stage("points");
-    const std::vector<std::uint32_t> part = parts_of_vertices();
-    for (std::size_t v = 0; v < vertices_.size(); ++v) {
-      readers_.push_back({vertices_[v], params_.points.groups_by_part ? part[v] : 0});
-    }
-    out_.surface = std::make_unique<LitSurface>(tracer, sky, LitSurface::Points{params.points, readers_}, threads);
+    out_.surface = std::make_unique<LitSurface>(tracer, sky, LitSurface::Points{params.points, vertices_}, threads);
     for (const MeshlessPoint& p : points().points) {
       sites_.push_back(p.site);
       at_.push_back(transfer_point(p));
@@ -124,13 +121,11 @@ class Solver {
   Reading read_receivers() const {
     std::vector<SurfaceSite> some;
     for (const std::uint32_t p : receiver_) some.push_back(sites_[p]);
-    return {tracer_, some, params_.neighbours, threads_};
+    return {tracer_, {some, points().cover, params_.neighbours}, threads_};
   }
 
-  std::vector<Readings::Place> places_of(std::uint32_t begin, std::uint32_t end) const {
-    std::vector<Readings::Place> places;
-    for (std::uint32_t p = begin; p < end; ++p) places.push_back({at_[p], sites_[p].group});
-    return places;
+  std::span<const TransferPoint> places_of(std::uint32_t begin, std::uint32_t end) const {
+    return std::span(at_).subspan(begin, end - begin);
   }
 
   /// COMPUTE-BOUNCE's refinement, for all bounces at once.
@@ -149,7 +144,7 @@ class Solver {
         for (const std::uint32_t p : children_of(mispredicted(before, level - 1, *predicted), level))
           chosen[p - begin] = 1;
         for (std::size_t i = 0; i < chosen.size(); ++i) {
-          if (!seen->any(i)) chosen[i] = 1;
+          if (!seen->any(i) || sites_[begin + i].group == kCoveredGroup) chosen[i] = 1;
         }
       }
       before = receiver_.size();
@@ -205,17 +200,16 @@ class Solver {
     for (int round = 0; round < 2; ++round) {
       const Reading reading = read_receivers();
       at_points_.emplace(reading, places_of(0, all), threads_);
-      at_vertices_.emplace(reading, readers_, threads_);
+      at_vertices_.emplace(reading, vertices_, threads_);
       if (gather_unseen() == 0) break;
     }
     receiver_of_.assign(all, kNoReceiver);
     for (std::uint32_t r = 0; r < receiver_.size(); ++r) receiver_of_[receiver_[r]] = r;
 
     nearest_.assign(vertices_.size(), Senders::kNone);
-    const float radius = points().radius.empty() ? 0.0F : points().radius.back();
     for_each(vertices_.size(), [&](std::size_t v) {
       if (at_vertices_->any(v)) return;
-      nearest_[v] = out_.surface->paths().world().senders.nearest(reader_site(readers_[v], radius));
+      nearest_[v] = out_.surface->paths().world().senders.nearest(reader_site(tracer_, vertices_[v], points().cover));
     });
     std::vector<TransferPoint> own;
     for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
@@ -236,15 +230,6 @@ class Solver {
     const std::vector<std::uint32_t> found = marked(unseen, 0);
     if (!found.empty()) gather(found);
     return found.size();
-  }
-
-  std::vector<std::uint32_t> parts_of_vertices() const {
-    const Mesh& mesh = tracer_.scene().mesh;
-    std::vector<std::uint32_t> part(mesh.position.size());
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      for (const std::uint32_t v : mesh.triangles[t]) part[v] = mesh.part[t];
-    }
-    return part;
   }
 
   /// The Neumann series i_{k+1} = c + T (e + i_k), mixed after its first terms, and the reading of its limit.
@@ -358,10 +343,9 @@ class Solver {
   const Tracer& tracer_;
   const Radiosity& params_;
   Threads& threads_;
-  DirectLight light_, rough_light_;       // at vertices, at points
-  std::vector<TransferPoint> vertices_;   // and the other places
-  std::vector<Readings::Place> readers_;  // the same, with their groups
-  std::vector<SurfaceSite> sites_;        // of the points
+  DirectLight light_, rough_light_;      // at vertices, at points
+  std::vector<TransferPoint> vertices_;  // and the other places
+  std::vector<SurfaceSite> sites_;       // of the points
   std::vector<TransferPoint> at_;
   std::optional<GatherRows> rows_;       // of the receivers, then of `alone_`
   std::vector<Vec3f> direct_;            // at the points
@@ -381,7 +365,6 @@ class Solver {
 RadiosityResult solve_radiosity(const Tracer& tracer, const Environment* sky, const Radiosity& params,
                                 Threads& threads) {
   EXPECTS(params.known_direct.empty() || params.known_direct.size() == tracer.scene().mesh.position.size());
-  EXPECTS(params.places.empty() || !params.points.groups_by_part);  // a place says no part
   EXPECTS(params.rays >= 1 && params.rays <= 65536 && params.neighbours >= 1 && params.uniform_levels >= 1);
   return Solver(tracer, sky, params, threads).solve();
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/meshless/cover.h"
 #include "core/meshless/in_sight.h"
 #include "core/prt/ray_origin.h"
 
@@ -18,10 +19,14 @@ MeshlessBasis one_level(std::span<const SurfaceSite> sites, int neighbours, Thre
 
 }  // namespace
 
-Reading::Reading(const Tracer& tracer, std::span<const SurfaceSite> sites, int neighbours, Threads& threads)
-    : tracer_(tracer), sites_(sites.begin(), sites.end()), basis_(one_level(sites_, neighbours, threads)) {}
+Reading::Reading(const Tracer& tracer, const Points& points, Threads& threads)
+    : tracer_(tracer),
+      sites_(points.sites.begin(), points.sites.end()),
+      cover_(points.cover),
+      basis_(one_level(sites_, points.neighbours, threads)) {}
 
-Reading::Seen Reading::at(const TransferPoint& p, std::uint32_t group) const {
+Reading::Seen Reading::at(const TransferPoint& p) const {
+  const std::uint32_t group = group_of(tracer_, p, cover_);
   std::vector<BasisTerm> near;
   if (basis_.terms({p.position, p.normal, group}, 1, near) != Cover::functions) return {};
   const SurfaceSite raised{ray_origin(p), p.normal, group};
@@ -40,13 +45,13 @@ Reading::Seen Reading::at(const TransferPoint& p, std::uint32_t group) const {
   return out.sum > kFewest ? out : Seen{};
 }
 
-Readings::Readings(const Reading& reading, std::span<const Place> places, Threads& threads)
+Readings::Readings(const Reading& reading, std::span<const TransferPoint> places, Threads& threads)
     : begin_(places.size() + 1) {
   std::vector<std::vector<BasisTerm>> found((places.size() + kBlock - 1) / kBlock);
   threads.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::vector<BasisTerm>& own = found[begin / kBlock];
     for (std::size_t i = begin; i < end; ++i) {
-      const Reading::Seen seen = reading.at(places[i].point, places[i].group);
+      const Reading::Seen seen = reading.at(places[i]);
       for (const BasisTerm& t : seen.terms) own.push_back({t.function, t.value / seen.sum});
       begin_[i + 1] = own.size();
     }

@@ -17,30 +17,32 @@ class Reading {
  public:
   static constexpr float kFewest = 0.05F;  // of the weight of all points: what is less is no interpolation
 
-  /// Keeps a reference to the tracer. `neighbours` around each point set how far it is read.
-  Reading(const Tracer&, std::span<const SurfaceSite>, int neighbours, Threads&);
+  struct Points {
+    std::span<const SurfaceSite> sites;
+    float cover = 0;      // of the hierarchy that they are from: covered places read covered points (cover.h)
+    int neighbours = 10;  // around each point set how far it is read
+  };
+  /// Keeps a reference to the tracer.
+  Reading(const Tracer&, const Points&, Threads&);
 
   /// Points that a place sees, by their index, and the sum of their weights; nothing where that is below kFewest.
   struct Seen {
     std::vector<BasisTerm> terms;
     float sum = 0;
   };
-  Seen at(const TransferPoint&, std::uint32_t group) const;
+  Seen at(const TransferPoint&) const;
 
  private:
   const Tracer& tracer_;
   std::vector<SurfaceSite> sites_;
+  float cover_;
   MeshlessBasis basis_;
 };
 
 /// What many places read, as rows of a sparse matrix whose weights add up to 1.
 class Readings {
  public:
-  struct Place {
-    TransferPoint point;
-    std::uint32_t group = 0;
-  };
-  Readings(const Reading&, std::span<const Place>, Threads&);
+  Readings(const Reading&, std::span<const TransferPoint> places, Threads&);
 
   /// Whether the place sees any point.
   bool any(std::size_t place) const { return begin_[place + 1] > begin_[place]; }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/mesh/topology.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/in_sight.h"
 
 namespace kiln {
@@ -32,11 +33,10 @@ Vec2f from_uv(std::uint8_t corner, float u, float v) {
 
 }  // namespace
 
-Senders::Senders(const Tracer& tracer, const PointHierarchy& points, const PointPlacement& placement, Threads& threads)
+Senders::Senders(const Tracer& tracer, const PointHierarchy& points, Threads& threads)
     : tracer_(tracer),
       scene_(tracer.scene()),
       points_(points),
-      groups_by_part_(placement.groups_by_part),
       finest_(points.radius.empty() ? 1.0F : points.radius.back()),
       grid_(2 * finest_) {
   const std::size_t triangles = scene_.mesh.triangles.size();
@@ -121,15 +121,19 @@ std::uint32_t Senders::answer_of_cell(std::uint32_t triangle, std::uint32_t i, s
     if (back) s.normal = -s.normal;
     return s;
   };
-  const Search found = search(site({0.5F, 0.5F}));
-  if (found.sender == kNone) return found.any ? kLook : kNone;
+  const SurfaceSite centre = grouped(site({0.5F, 0.5F}));
+  const Search found = search(centre);
   std::array<SurfaceSite, kCorners.size()> corners;
   float longest = 0;
   for (std::size_t k = 0; k < corners.size(); ++k) {
     corners[k] = site(kCorners[k]);
     longest = std::max(longest, length(corners[k].position - corners[0].position));
   }
-  if (longest <= kSmall * finest_) return found.sender;
+  const bool small = longest <= kSmall * finest_;
+  if (!small && std::ranges::any_of(corners, [&](const SurfaceSite& s) { return grouped(s).group != centre.group; }))
+    return kLook;
+  if (found.sender == kNone) return found.any ? kLook : kNone;
+  if (small) return found.sender;
   return in_sight(tracer_, this->site(found.sender), corners) == (1U << corners.size()) - 1 ? found.sender : kLook;
 }
 
@@ -142,7 +146,11 @@ SurfaceSite Senders::site_on(std::uint32_t triangle, float u, float v, bool back
   const Vec3f shading = mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]];
   if (is_double_sided(scene_, triangle) && dot(site.normal, shading) < 0) site.normal = -site.normal;
   if (back) site.normal = -site.normal;
-  site.group = groups_by_part_ ? mesh.part[triangle] : 0;
+  return site;
+}
+
+SurfaceSite Senders::grouped(SurfaceSite site) const {
+  site.group = group_of(tracer_, {site.position, site.normal, site.position, site.normal}, points_.cover);
   return site;
 }
 
@@ -183,14 +191,14 @@ Senders::Search Senders::search(const SurfaceSite& at) const {
 std::uint32_t Senders::at(std::uint32_t triangle, float u, float v) const {
   const Face& f = faces_[triangle];
   const std::uint32_t known = f.columns == 0 ? kLook : cells_[cell_at(f, u, v)];
-  return known == kLook ? nearest(site_on(triangle, u, v, false)) : known;
+  return known == kLook ? nearest(grouped(site_on(triangle, u, v, false))) : known;
 }
 
 std::uint32_t Senders::behind(std::uint32_t triangle, float u, float v) const {
   if (!backs_) return kNone;
   const Face& f = faces_[triangle];
   const std::uint32_t known = f.columns == 0 ? kLook : back_cells_[cell_at(f, u, v)];
-  return known == kLook ? nearest(site_on(triangle, u, v, true)) : known;
+  return known == kLook ? nearest(grouped(site_on(triangle, u, v, true))) : known;
 }
 
 std::uint32_t Senders::cell_at(const Face& f, float u, float v) const {

@@ -3,11 +3,11 @@
 // Nearest  by the distance of equation 1 of points.h, |x - x_q| / (n . n_q): a point round a sharp corner is far.
 // Sight    in_sight.h: what a wall or a fold of cloth parts does not answer for what is behind it.
 // Reach    2 R of the finest level: farther points do not answer, nor do more than the 32 nearest of those within
-// reach. Places without a sender must be followed by paths. Table    each triangle is cut into cells of at most R x R
-// along two of its edges, and a cell answers once for all, as
-//          at its centre: a hit costs one read. Where the centre's answer is not seen from near the cell's corners, and
-//          on triangles for which cells take far more than their area deserves (blunt needles), each hit looks for
-//          itself.
+//          reach. Places without a sender must be followed by paths.
+// Table    each triangle is cut into cells of at most R x R along two of its edges, and a cell answers once for all, as
+//          at its centre: a hit costs one read. Where the centre's answer is not seen from near the cell's corners,
+//          where a gap begins or ends in the cell (cover.h), and on triangles for which cells take far more than their
+//          area deserves (blunt needles), each hit looks for itself.
 // Backs    of double-sided faces have cells of their own where points stand on some.
 // Memory   12 bytes a triangle, 4 a cell: about three cells a point
 // Repeat   a pure function of its arguments: of two equally near points the first counts
@@ -29,7 +29,7 @@ class Senders {
   static constexpr float kReach = 2;  // of R
 
   /// Keeps references to tracer and points.
-  Senders(const Tracer&, const PointHierarchy&, const PointPlacement&, Threads&);
+  Senders(const Tracer&, const PointHierarchy&, Threads&);
 
   /// Takes in points that were added to the hierarchy behind those known so far: they answer where none did.
   void add_new(Threads&);
@@ -69,6 +69,8 @@ class Senders {
   std::size_t near(const SurfaceSite&, float reach, std::array<Candidate, most>& first) const;
   Search search(const SurfaceSite&) const;
   SurfaceSite site_on(std::uint32_t triangle, float u, float v, bool back) const;
+  /// The site with its group (cover.h), which the two above leave open.
+  SurfaceSite grouped(SurfaceSite) const;
   std::uint32_t cell_at(const Face&, float u, float v) const;
 
   static constexpr std::uint32_t kLook = 0xfffffffeU;  // of a cell: each hit looks for itself
@@ -76,7 +78,7 @@ class Senders {
   const Tracer& tracer_;
   const Scene& scene_;
   const PointHierarchy& points_;
-  bool groups_by_part_, backs_ = false;
+  bool backs_ = false;
   float finest_ = 0;
   PointGrid grid_;
   std::vector<Face> faces_;

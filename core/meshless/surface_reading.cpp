@@ -11,12 +11,12 @@ Reading read_computed(const SurfaceReading::Surface& surface, std::span<const st
                       Threads& threads) {
   std::vector<SurfaceSite> sites;
   for (const std::uint32_t p : computed) sites.push_back(surface.points.points[p].site);
-  return {surface.tracer, sites, neighbours, threads};
+  return {surface.tracer, {sites, surface.points.cover, neighbours}, threads};
 }
 
-std::vector<Readings::Place> places_of(const PointHierarchy& points) {
-  std::vector<Readings::Place> places;
-  for (const MeshlessPoint& p : points.points) places.push_back({transfer_point(p), p.site.group});
+std::vector<TransferPoint> places_of(const PointHierarchy& points) {
+  std::vector<TransferPoint> places;
+  for (const MeshlessPoint& p : points.points) places.push_back(transfer_point(p));
   return places;
 }
 
@@ -33,10 +33,10 @@ SurfaceReading::SurfaceReading(const Surface& surface, const Reading& reading, s
       self_(surface.points.points.size()),
       nearest_(surface.vertices.size(), Senders::kNone) {
   for (std::uint32_t n = 0; n < computed.size(); ++n) self_[computed[n]] = {n, 1};
-  const float radius = surface.points.radius.empty() ? 0.0F : surface.points.radius.back();
   threads.for_blocks(nearest_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      if (!at_vertices_.any(v)) nearest_[v] = surface.senders.nearest(reader_site(surface.vertices[v], radius));
+      if (at_vertices_.any(v)) continue;
+      nearest_[v] = surface.senders.nearest(reader_site(surface.tracer, surface.vertices[v], surface.points.cover));
     }
   });
   for (std::uint32_t v = 0; v < nearest_.size(); ++v) {

@@ -22,7 +22,7 @@ class SurfaceReading {
     const Tracer& tracer;
     const PointHierarchy& points;
     const Senders& senders;
-    std::span<const Readings::Place> vertices;
+    std::span<const TransferPoint> vertices;
   };
   /// `computed` holds points, in the order of what is read.
   SurfaceReading(const Surface&, std::span<const std::uint32_t> computed, int neighbours, Threads&);

@@ -44,10 +44,7 @@ class Solver {
         vertices_(vertex_points(tracer.scene().mesh)) {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     begin_stage("points");
-    const std::vector<std::uint32_t> part = parts_of_vertices();
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      readers_.push_back({vertices_[v], params.points.groups_by_part ? part[v] : 0});
-    surface_.emplace(tracer, nullptr, LitSurface::Points{params.points, readers_}, threads);
+    surface_.emplace(tracer, nullptr, LitSurface::Points{params.points, vertices_}, threads);
     for (const MeshlessPoint& p : points().points) at_.push_back(transfer_point(p));
     out_.transfer = {.order = params.sky.order, .channels = 3, .fixed = !fixed.empty(), .coefficients = {}};
   }
@@ -75,15 +72,6 @@ class Solver {
 
   void begin_stage(std::string_view name) const {
     if (params_.stage) params_.stage(name);
-  }
-
-  std::vector<std::uint32_t> parts_of_vertices() const {
-    const Mesh& mesh = tracer_.scene().mesh;
-    std::vector<std::uint32_t> part(mesh.position.size());
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      for (const std::uint32_t v : mesh.triangles[t]) part[v] = mesh.part[t];
-    }
-    return part;
   }
 
   /// Direct light as a row of the result.
@@ -206,7 +194,7 @@ class Solver {
   }
 
   void prepare_reading() {
-    const SurfaceReading::Surface surface{tracer_, points(), surface_->paths().world().senders, readers_};
+    const SurfaceReading::Surface surface{tracer_, points(), surface_->paths().world().senders, vertices_};
     reading_.emplace(surface, receiver_, params_.neighbours, threads_);
     if (const std::vector<std::uint32_t> unseen = reading_->unseen(); !unseen.empty()) {
       gather(unseen);
@@ -339,7 +327,6 @@ class Solver {
   const std::vector<Vec3f>& fixed_;
   const std::size_t count_;
   std::vector<TransferPoint> vertices_;
-  std::vector<Readings::Place> readers_;
   std::optional<LitSurface> surface_;
   std::vector<TransferPoint> at_;        // the points
   Table at_points_, total_;              // direct light; what the next reflection gathers

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/mesh/topology.h"
+#include "core/meshless/cover.h"
 #include "core/sphere/sampling.h"
 #include "tests/core/prt/test_scenes.h"
 
@@ -183,21 +184,26 @@ TEST(MeshlessPoints, ShareCoincidentSheetsThatLookTheSameWay) {
               0.1 * static_cast<double>(once.points.size()));
 }
 
-TEST(MeshlessPoints, GroupsDoNotRefuseEachOther) {
+TEST(MeshlessPoints, InAGapAreAGroupOfTheirOwn) {
+  // A floor and a double-sided sheet over its middle, nearer than half of the finest R: whatever is below the sheet
+  // stands apart from what is beside it, on both sides of the gap and as densely as in the open.
   Scene scene = floor_scene();
-  const std::uint32_t second = testing::add_part(scene, {1, 1, 1});
-  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1, second);
-  const PointPlacement params{.radius = 0.1F, .levels = 2, .groups_by_part = true};
-  std::size_t count[2] = {0, 0};
-  const PointHierarchy h = place(scene, params);
+  const std::uint32_t sheet = testing::add_part(scene, {1, 1, 1}, true);
+  testing::add_grid(scene, {-0.25F, 0.02F, 0.25F}, {0.5F, 0, 0}, {0, 0, -0.5F}, 1, 1, sheet);
+  const PointHierarchy h = place(scene, {.radius = 0.1F, .levels = 2});
+  EXPECT_FLOAT_EQ(h.cover, 0.05F);
+  std::size_t below = 0, back = 0, beside = 0;
   for (const MeshlessPoint& p : h.points) {
-    EXPECT_EQ(p.site.group, scene.mesh.part[p.triangle]);
-    ++count[p.site.group];
+    const Vec3f& x = p.site.position;
+    const bool inside = std::max(std::abs(x.x), std::abs(x.z)) < 0.25F;
+    EXPECT_EQ(p.site.group, p.behind || (inside && x.y < 0.01F) ? kCoveredGroup : kOpenGroup);
+    if (p.behind) ++back;
+    if (x.y < 0.01F) ++(inside ? below : beside);
   }
   expect_distances_kept(h);
-  const auto alone = static_cast<double>(place(floor_scene(), {.radius = 0.1F, .levels = 2}).points.size());
-  EXPECT_NEAR(static_cast<double>(count[0]), alone, 0.15 * alone);
-  EXPECT_NEAR(static_cast<double>(count[1]), alone, 0.15 * alone);
+  // Three quarters of the floor lie beside; some 75 points on the quarter below, at random to about their root.
+  EXPECT_NEAR(static_cast<double>(below), static_cast<double>(beside) / 3, 0.2 * static_cast<double>(below));
+  EXPECT_NEAR(static_cast<double>(back), static_cast<double>(below), 0.2 * static_cast<double>(below));
 }
 
 TEST(MeshlessPoints, StandOnTheSideThatVerticesHaveLightFor) {

@@ -166,6 +166,38 @@ TEST(Radiosity, FollowsLightOnBacksOfDoubleSidedFaces) {
   EXPECT_LT(error_against_paths(scene, r, nullptr, 8192), 0.042);
 }
 
+/// A closed room and a double-sided lamp, `gap` of the room below its ceiling.
+Scene room_with_lamp_below_ceiling(float gap) {
+  Scene scene = testing::empty_scene();
+  const std::uint32_t walls = testing::add_part(scene, {0.4F, 0.4F, 0.4F}, true);
+  testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 16, true, walls);
+  const std::uint32_t lamp = add_lit_part(scene, {0.8F, 0.8F, 0.8F}, {10, 10, 10}, true);
+  testing::add_grid(scene, {-0.15F, 0.5F - gap, -0.15F}, {0.3F, 0, 0}, {0, 0, 0.3F}, 1, 1, lamp);
+  return scene;
+}
+
+TEST(Radiosity, FollowsLightInTheGapBetweenALampAndItsCeiling) {
+  // Points are .037 apart, so the gap is half as wide, or a twentieth. In the middle of the narrow one light goes to
+  // and fro as between endless sheets: 10 rho rho' / (1 - rho rho') = 4.706 is reflected; 4.64 was measured, as points
+  // at the rim are darker and count for the whole disk around them. Of all vertices .147 and .060 were measured, as
+  // light changes at the rim over a gap's width. Without groups (cover.h): 4.06, .53 and .95.
+  for (const auto& [gap, tolerance] : {std::pair{0.02F, 0.17}, std::pair{0.0016F, 0.08}}) {
+    const Scene scene = room_with_lamp_below_ceiling(gap);
+    const RadiosityResult r = solve(scene, {.points = {.wanted = 3000}});
+    double above = 0;
+    int count = 0;
+    for (std::size_t v = 0; v < r.direct.size(); ++v) {
+      const Vec3f& p = scene.mesh.position[v];
+      if (p.y > 0.499F && std::abs(p.x) < 0.07F && std::abs(p.z) < 0.07F) above += r.indirect[v].x, ++count;
+    }
+    std::printf("gap %g: %g reflected in the middle\n", gap, above / count);
+    if (gap < 0.01F) {
+      EXPECT_NEAR(above / count, 4.706, 0.03 * 4.706);
+    }
+    EXPECT_LT(error_against_paths(scene, r, nullptr, 128), tolerance);
+  }
+}
+
 TEST(Radiosity, OfVerticesInsideASolidIsDark) {
   Scene scene = lamp_room();
   const std::size_t first = scene.mesh.position.size();
@@ -312,7 +344,7 @@ TEST(GatherRows, KnowFromWhichSideLightComes) {
   const GatherFaces faces(scene);
   const HitAlbedo albedo(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 8000}, threads);
-  const Senders senders(tracer, h, PointPlacement{}, threads);
+  const Senders senders(tracer, h, threads);
   const DirectLight dark(tracer, nullptr, {});
   const SenderPaths paths({tracer, faces, albedo, senders, &dark});
   GatherRows rows(paths, 4096, 3);
@@ -342,7 +374,7 @@ TEST(Senders, DoNotAnswerThroughAWall) {
   const Tracer tracer(scene, threads);
   const PointHierarchy h = place_points(tracer, GatherFaces(scene), {.wanted = 600}, threads);
   ASSERT_GT(h.radius.back(), 0.02F);
-  const Senders senders(tracer, h, PointPlacement{}, threads);
+  const Senders senders(tracer, h, threads);
   for (std::uint32_t i = 0; i < 4000; ++i) {
     Random random(22, i);
     const auto t = static_cast<std::uint32_t>(random.next() % 18);
@@ -363,17 +395,16 @@ TEST(Demand, GivesEveryReaderAPointThatItSees) {
   const GatherFaces faces(scene);
   const PointPlacement placement{.wanted = 1500};
   PointHierarchy h = place_points(tracer, faces, placement, threads);
-  std::vector<Readings::Place> readers;
-  for (const TransferPoint& p : vertex_points(scene.mesh)) readers.push_back({p});
-  Senders senders(tracer, h, placement, threads);
+  const std::vector<TransferPoint> readers = vertex_points(scene.mesh);
+  Senders senders(tracer, h, threads);
   const auto unseen = [&] {
-    return std::count_if(readers.begin(), readers.end(), [&](const Readings::Place& p) {
-      return senders.nearest(reader_site(p, h.radius.back())) == Senders::kNone;
+    return std::count_if(readers.begin(), readers.end(), [&](const TransferPoint& p) {
+      return senders.nearest(reader_site(tracer, p, h.cover)) == Senders::kNone;
     });
   };
   const auto before = unseen();
   const std::size_t placed = h.points.size();
-  add_demanded({tracer, faces, placement, readers}, h, senders, threads);
+  add_demanded({tracer, faces, placement.seed, readers}, h, senders, threads);
   std::printf("unseen before %td after %td of %zu, points %zu and %zu\n", before, unseen(), readers.size(), placed,
               h.points.size() - placed);
   EXPECT_GT(before, 100);
@@ -410,7 +441,7 @@ TEST(Senders, AnswerWithTheNearestPointToWithinACell) {
   const Tracer tracer(scene, threads);
   const GatherFaces faces(scene);
   const PointHierarchy h = place_points(tracer, faces, {.wanted = 3000}, threads);
-  const Senders senders(tracer, h, PointPlacement{}, threads);
+  const Senders senders(tracer, h, threads);
   int answered = 0;
   for (std::uint32_t i = 0; i < 3000; ++i) {
     Random random(21, i);
