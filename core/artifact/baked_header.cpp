@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "core/artifact/json_fields.h"
-#include "core/lightfield/lamp_highlights.h"
+#include "core/lightfield/field_lamp.h"
 
 namespace kiln {
 namespace {

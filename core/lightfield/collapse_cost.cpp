@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/lightfield/lamp_highlights.h"
+#include "core/lightfield/field_lamp.h"
 #include "core/lightfield/radiance_function.h"
 #include "core/mesh/topology.h"
 

@@ -12,12 +12,6 @@
 
 namespace kiln {
 
-/// With the lobe that distances see.
-FieldLamp make_field_lamp(const Light&, const Vec3f& mean);
-
-/// Mean square of how highlights change with the normal, RGB, per square radian (as LightField::sky_slope).
-double lamp_slope(std::span<const FieldLamp>);
-
 struct LampEye {
   Vec3d place, normal, view;  // unit, the view points to the eye; one below the horizon counts as at it
   Vec3d f0;

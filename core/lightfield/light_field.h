@@ -33,7 +33,7 @@ inline constexpr int kVisibilityOrder = 3;
 inline constexpr std::size_t kVisibilityCount = sh_count(kVisibilityOrder);
 using SkyVisibility = std::array<float, kVisibilityCount>;
 
-/// A punctual lamp that is kept apart (lamp_highlights.h makes it).
+/// A punctual lamp that is kept apart (field_lamp.h makes it).
 struct FieldLamp {
   Light light;                                 // lengths of the unit cube
   Vec3f mean;                                  // F0 times its irradiance, root mean square: for distances only,

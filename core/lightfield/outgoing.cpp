@@ -9,8 +9,8 @@
 #include <numeric>
 
 #include "core/base/expects.h"
+#include "core/lightfield/field_lamp.h"
 #include "core/lightfield/hemisphere_norm.h"
-#include "core/lightfield/lamp_highlights.h"
 #include "core/lightfield/lobe_fits.h"
 #include "core/lightfield/mirrored_sky.h"
 #include "core/lightfield/visibility_fit.h"

@@ -9,7 +9,7 @@
 #include "core/artifact/progressive_glb.h"
 #include "core/artifact/sky_levels.h"
 #include "core/base/random.h"
-#include "core/lightfield/lamp_highlights.h"
+#include "core/lightfield/field_lamp.h"
 #include "core/lightfield/progressive_mesh.h"
 #include "tests/core/artifact/random_baked.h"
 #include "tests/core/artifact/round_trip.h"

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/lightfield/collapse_cost.h"
+#include "core/lightfield/field_lamp.h"
 #include "core/lightfield/outgoing.h"
 #include "core/lightfield/seen.h"
 #include "core/lightfield/simplify.h"
