@@ -87,20 +87,23 @@ Vec2f even_uv(double a, double b) {
 
 /// Areas of the triangles that are covered somewhere on the given side, as far as one look for each R^2 tells; 0 of the
 /// others, and of backs that are dark.
-std::vector<double> covered_areas(const Tracer& tracer, std::vector<double> areas, float cover, bool behind) {
+std::vector<double> covered_areas(const Tracer& tracer, std::vector<double> areas, float cover, bool behind,
+                                  Threads& threads) {
   const Scene& scene = tracer.scene();
   constexpr int kMostLooks = 1 << 16;
-  for (std::uint32_t t = 0; t < areas.size(); ++t) {
-    if (behind && !is_double_sided(scene, t)) areas[t] = 0;
+  const auto is_covered = [&](std::uint32_t t) {
+    if (behind && !is_double_sided(scene, t)) return false;
     const int looks = static_cast<int>(std::min<double>(kMostLooks, std::ceil(areas[t] / (double{cover} * cover))));
-    bool any = false;
-    for (int k = 0; k < looks && !any; ++k) {
+    for (int k = 0; k < looks; ++k) {
       const Vec2f u = sobol_owen(static_cast<std::uint32_t>(k), mix64(t));
       const MeshlessPoint p = point_on(scene, t, even_uv(u.x, u.y), behind);
-      any = group_of(tracer, transfer_point(p), cover) == kCoveredGroup;
+      if (group_of(tracer, transfer_point(p), cover) == kCoveredGroup) return true;
     }
-    if (!any) areas[t] = 0;
-  }
+    return false;
+  };
+  threads.for_blocks(areas.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) areas[t] = is_covered(static_cast<std::uint32_t>(t)) ? areas[t] : 0;
+  });
   return areas;
 }
 
@@ -218,8 +221,8 @@ PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, cons
   if (!(triangles.total() > 0)) return out;
   out.cover = std::ldexp(params.radius, 1 - params.levels);
   EXPECTS(expected_points(triangles.total(), out.cover) < 0x1p31);
-  const AreaSampler backs(covered_areas(tracer, areas, out.cover, true));
-  const std::vector<double> covered = covered_areas(tracer, areas, out.cover, false);
+  const AreaSampler backs(covered_areas(tracer, areas, out.cover, true, threads));
+  const std::vector<double> covered = covered_areas(tracer, areas, out.cover, false, threads);
   const Level::Surface surface{tracer, faces, params.both_sides > 0, covered};
 
   float radius = params.radius;
