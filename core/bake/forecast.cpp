@@ -90,6 +90,9 @@ double rough_share(const Plan& plan, double exact_rays) {
 // Of a reflected ray, its hit and what it gathers, against a ray for distant light and its share of projection: 2
 // (scans in the open) to 5 (dungeon) were measured.
 constexpr double kReflectedPrice = 3.4;
+// With lamps the spots that they make are looked for from their end too (bright_spots.h): .56 to .83 of the seconds of
+// four scenes with lamps were foretold without it.
+constexpr double kSpotPrice = 1.35;
 // Vertices of little surface take fewer rays (interreflection.cpp): .74 to .96 of them on four scenes that were split.
 constexpr double kSplitShare = 0.8;
 
@@ -128,7 +131,7 @@ ReflectionCosts reflection_costs(const Plan& plan, const Scene& scene, const Siz
   if (!plan.meshless) {
     const Interreflection passes{.bounces = plan.bounces, .samples = plan.bounce_samples};
     const double rays = sizes.vertices * (plan.split ? kSplitShare : 1) * static_cast<double>(rays_per_vertex(passes));
-    return {.rays = rays, .seconds = rays * kReflectedPrice * price};
+    return {.rays = rays, .seconds = rays * kReflectedPrice * (plan.lamps ? kSpotPrice : 1) * price};
   }
   const double points = points_of(sweep_points(*plan.meshless, scene, sizes.vertices), scene);
   const double numbers = 3 * (sh_count(plan.order) + (plan.lamps ? 1 : 0));
@@ -141,8 +144,7 @@ ReflectionCosts reflection_costs(const Plan& plan, const Scene& scene, const Siz
           .memory = 12 * gathered + points * (300 + 4 * numbers * 6)};
 }
 
-/// Of the matrices, as if vertices were added everywhere alike. The column scene with a metal knot: 6.6 s foretold, 7.1
-/// measured; with a metal floor, which gets most of the new vertices, 3.5 and 9.0.
+/// Of the matrices, as if vertices were added everywhere alike: too few where most of the new ones are on metal.
 struct MatrixCosts {
   double rays = 0, seconds = 0, memory = 0, bytes = 0;
 };
@@ -150,15 +152,16 @@ struct MatrixCosts {
 MatrixCosts matrix_costs(const Plan& plan, const Scene& scene, double vertices, double price) {
   if (!plan.glossy) return {};
   constexpr double kComponents = 128, kSamples = 2 * kGlossySamples, kProduct = 1.5e-4;
+  constexpr double kAdding = 1.3e-10;  // of a ray, for each number of its matrix: lantern, helmet and mixed lamps
   const double count = vertices * plan.glossy.vertex_share, outputs = sh_count(plan.glossy.order);
   const double numbers = 3 * outputs * (outputs + (plan.lamps ? 1 : 0));
   const double computed = plan.meshless ? matrices_on_points(plan, scene, count) : count;
   const double rays = (computed + kSamples) * plan.glossy.samples;
-  return {
-      .rays = rays,
-      .seconds = rays * kReflectedPrice * price + computed * kProduct + 0.4 + (plan.meshless ? kReadPrice * count : 0),
-      .memory = 8 * count * kComponents + 2.5 * 8 * numbers * kGlossySamples,
-      .bytes = 95 * count + 4 * (kComponents + 1) * numbers + 5e4};
+  return {.rays = rays,
+          .seconds = rays * (kReflectedPrice * price + kAdding * numbers) + computed * kProduct + 0.4 +
+                     (plan.meshless ? kReadPrice * count : 0),
+          .memory = 8 * count * kComponents + 2.5 * 8 * numbers * kGlossySamples,
+          .bytes = 95 * count + 4 * (kComponents + 1) * numbers + 5e4};
 }
 
 /// Of merging, which looks at the input twice by few rays (merge_step.h). Simplification took 40 to 60 us a vertex.
