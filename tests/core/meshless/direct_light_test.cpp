@@ -11,23 +11,16 @@
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 #include "core/trace/reference.h"
-#include "tests/core/prt/test_scenes.h"
+#include "tests/core/prt/lamp_scenes.h"
 
 namespace kiln {
 namespace {
-
-/// A part that shines with this radiance and reflects nothing.
-std::uint32_t add_lamp_part(Scene& scene, const Vec3f& radiance, bool double_sided = false) {
-  const std::uint32_t part = testing::add_part(scene, {0, 0, 0}, double_sided);
-  scene.materials.back().emission = radiance;
-  return part;
-}
 
 TEST(DirectLight, InAClosedBoxOfLampsIsTheirRadianceEverywhere) {
   // Every wall has radiance 1, so irradiance / pi is 1 at any place and for any normal; also at the very edges, where
   // horizons cut lamps that touch. Rays that slip through a seam and float rounding are left.
   Scene scene = testing::empty_scene();
-  testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 3, true, add_lamp_part(scene, {1, 1, 1}));
+  testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 3, true, testing::add_lamp_part(scene, {1, 1, 1}));
   Threads threads(1);
   const Tracer tracer(scene, threads);
   ASSERT_TRUE(FlatLamps::find(tracer));
@@ -48,7 +41,8 @@ TEST(DirectLight, OfLampsAgreesWithPointsAndRays) {
   // A blocker half covers the lamp; the other estimator takes 16384 rays, so its noise is .001 and less.
   Scene scene = testing::empty_scene();
   testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 6, 6);
-  testing::add_grid(scene, {-0.15F, 0.5F, -0.15F}, {0.3F, 0, 0}, {0, 0, 0.3F}, 4, 4, add_lamp_part(scene, {5, 4, 3}));
+  testing::add_grid(scene, {-0.15F, 0.5F, -0.15F}, {0.3F, 0, 0}, {0, 0, 0.3F}, 4, 4,
+                    testing::add_lamp_part(scene, {5, 4, 3}));
   testing::add_grid(scene, {-0.1F, 0.2F, -0.2F}, {0.4F, 0, 0}, {0, 0, 0.3F}, 1, 1);
   scene.lights.push_back({.type = LightType::point, .intensity = {0.1F, 0.1F, 0.1F}, .position = {0.3F, 0.4F, 0}});
   Threads threads(2);

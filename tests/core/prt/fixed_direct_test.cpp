@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/prt/interreflection.h"
-#include "tests/core/prt/test_scenes.h"
+#include "tests/core/prt/lamp_scenes.h"
 
 namespace kiln {
 namespace {
@@ -20,18 +20,8 @@ Vec3f fixed_at(const Scene& scene, const TransferPoint& point, int samples, std:
 
 TransferPoint floor_point(const Vec3f& position) { return {position, {0, 1, 0}, position, {0, 1, 0}}; }
 
-// A floor at y = 0 and a square lamp of half side 0.25 overhead that faces down.
-Scene lamp_scene(float height, float radiance) {
-  Scene scene = testing::empty_scene();
-  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
-  const std::uint32_t lamp = testing::add_part(scene, {0, 0, 0});
-  scene.materials.back().emission = {radiance, radiance / 2, 0};
-  testing::add_grid(scene, {-0.25F, height, -0.25F}, {0.5F, 0, 0}, {0, 0, 0.5F}, 1, 1, lamp);
-  return scene;
-}
-
 TEST(FixedDirect, AFlatLampInTheOpenCostsFewRaysAndAnyOtherItsSamples) {
-  Scene scene = lamp_scene(0.2F, 1);
+  Scene scene = testing::lamp_scene(0.2F, 1);
   Threads threads(1);
   const std::vector<TransferPoint> below{floor_point({0.1F, 0, 0})};
   const auto bake = [&](const FixedDirect& params) {
@@ -49,7 +39,7 @@ TEST(FixedDirect, AFlatLampInTheOpenCostsFewRaysAndAnyOtherItsSamples) {
 }
 
 TEST(FixedDirect, BackOfASingleSidedLampIsDark) {
-  Scene scene = lamp_scene(0.2F, 1);
+  Scene scene = testing::lamp_scene(0.2F, 1);
   const TransferPoint above{{0, 0.4F, 0}, {0, -1, 0}, {0, 0.4F, 0}, {0, -1, 0}};
   EXPECT_EQ(fixed_at(scene, above, 64).x, 0.0F);
   scene.materials.back().double_sided = true;

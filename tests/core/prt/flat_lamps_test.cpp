@@ -6,17 +6,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/core/prt/test_scenes.h"
+#include "tests/core/prt/lamp_scenes.h"
 
 namespace kiln {
 namespace {
-
-/// A part that shines with this radiance and reflects nothing.
-std::uint32_t add_lamp_part(Scene& scene, const Vec3f& radiance, bool double_sided = false) {
-  const std::uint32_t part = testing::add_part(scene, {0, 0, 0}, double_sided);
-  scene.materials.back().emission = radiance;
-  return part;
-}
 
 const std::vector<Vec3d> kSquare = {{-0.5, 1, -0.5}, {0.5, 1, -0.5}, {0.5, 1, 0.5}, {-0.5, 1, 0.5}};
 
@@ -44,7 +37,7 @@ TEST(LoopFormFactor, OfAHorizonThatCutsIsThatOfThePartAbove) {
 TEST(FlatLamps, DropInnerEdgesAndSeeTwoSquaresWithTheirFormFactor) {
   // Two facing unit squares a unit apart: F = .199825 (closed form, Howell C-11), the mean over the receiver.
   Scene scene = testing::empty_scene();
-  const std::uint32_t lamp = add_lamp_part(scene, {1, 2, 3});
+  const std::uint32_t lamp = testing::add_lamp_part(scene, {1, 2, 3});
   testing::add_grid(scene, {-0.5F, 0.5F, -0.5F}, {1, 0, 0}, {0, 0, 1}, 7, 5, lamp);  // looks down
   Threads threads(1);
   const Tracer tracer(scene, threads);
@@ -68,7 +61,8 @@ TEST(FlatLamps, DropInnerEdgesAndSeeTwoSquaresWithTheirFormFactor) {
 TEST(FlatLamps, HaveNoLightBehindUnlessTheyShineBothWays) {
   for (const bool both : {false, true}) {
     Scene scene = testing::empty_scene();
-    testing::add_grid(scene, {-0.5F, 0, -0.5F}, {1, 0, 0}, {0, 0, 1}, 2, 2, add_lamp_part(scene, {1, 1, 1}, both));
+    testing::add_grid(scene, {-0.5F, 0, -0.5F}, {1, 0, 0}, {0, 0, 1}, 2, 2,
+                      testing::add_lamp_part(scene, {1, 1, 1}, both));
     Threads threads(1);
     const Tracer tracer(scene, threads);
     std::uint64_t rays = 0;
@@ -84,11 +78,11 @@ TEST(FlatLamps, HaveNoLightBehindUnlessTheyShineBothWays) {
 
 TEST(FlatLamps, RefuseWhatIsNotFlat) {
   Scene round = testing::empty_scene();
-  testing::add_sphere(round, {}, 0.3F, 8, add_lamp_part(round, {1, 1, 1}));
+  testing::add_sphere(round, {}, 0.3F, 8, testing::add_lamp_part(round, {1, 1, 1}));
   Threads threads(1);
   EXPECT_FALSE(FlatLamps::find(Tracer(round, threads)));
   Scene twice = testing::empty_scene();
-  const std::uint32_t part = add_lamp_part(twice, {1, 1, 1});
+  const std::uint32_t part = testing::add_lamp_part(twice, {1, 1, 1});
   for (int i = 0; i < 2; ++i) testing::add_grid(twice, {-0.5F, 0, -0.5F}, {1, 0, 0}, {0, 0, 1}, 1, 1, part);
   EXPECT_FALSE(FlatLamps::find(Tracer(twice, threads)));  // its outline would count twice
 }
@@ -96,7 +90,8 @@ TEST(FlatLamps, RefuseWhatIsNotFlat) {
 /// Where a blocker hides a part of a lamp rounds go on until they agree; the error falls with the tolerance.
 TEST(FlatLamps, TakeMoreRaysWhereALampIsPartlyHidden) {
   Scene scene = testing::empty_scene();
-  testing::add_grid(scene, {-0.25F, 0.5F, -0.25F}, {0.5F, 0, 0}, {0, 0, 0.5F}, 1, 1, add_lamp_part(scene, {1, 1, 1}));
+  testing::add_grid(scene, {-0.25F, 0.5F, -0.25F}, {0.5F, 0, 0}, {0, 0, 0.5F}, 1, 1,
+                    testing::add_lamp_part(scene, {1, 1, 1}));
   testing::add_grid(scene, {-0.1F, 0.2F, -0.3F}, {0.5F, 0, 0}, {0, 0, 0.6F}, 1, 1);
   Threads threads(1);
   const Tracer tracer(scene, threads);

@@ -5,20 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/core/prt/test_scenes.h"
+#include "tests/core/prt/lamp_scenes.h"
 
 namespace kiln {
 namespace {
-
-// A floor at y = 0 and a square lamp of half side 0.25 overhead that faces down.
-Scene lamp_scene(float height, float radiance) {
-  Scene scene = testing::empty_scene();
-  testing::add_grid(scene, {-0.5F, 0, 0.5F}, {1, 0, 0}, {0, 0, -1}, 1, 1);
-  const std::uint32_t lamp = testing::add_part(scene, {0, 0, 0});
-  scene.materials.back().emission = {radiance, radiance / 2, 0};
-  testing::add_grid(scene, {-0.25F, height, -0.25F}, {0.5F, 0, 0}, {0, 0, 0.5F}, 1, 1, lamp);
-  return scene;
-}
 
 double corner_factor(double a, double b, double c) {
   const double x = a / c, y = b / c;
@@ -38,7 +28,7 @@ Vec3f emitted_at(const Scene& scene, const Receiver& at, const EmitterRays& rays
 
 TEST(Lamps, PointUnderALampReceivesItsFormFactor) {
   for (const float height : {0.3F, 0.1F, 0.01F, 0.001F}) {  // down to nearly touching
-    const Vec3f value = emitted_at(lamp_scene(height, 4), on_the_floor(0, 0), {.samples = 4096});
+    const Vec3f value = emitted_at(testing::lamp_scene(height, 4), on_the_floor(0, 0), {.samples = 4096});
     const double expected = 4 * 4 * corner_factor(0.25, 0.25, height);
     EXPECT_NEAR(value.x / expected, 1, 0.01) << height;  // 1024 cosine rays at worst: 0.3 / 1024^0.5
     EXPECT_NEAR(value.y, value.x / 2, 1e-5F * value.x);
@@ -47,7 +37,7 @@ TEST(Lamps, PointUnderALampReceivesItsFormFactor) {
 }
 
 TEST(Lamps, TheMeanOfManySmallRunsHasNoBias) {
-  const Scene scene = lamp_scene(0.05F, 1);
+  const Scene scene = testing::lamp_scene(0.05F, 1);
   double sum = 0;
   constexpr int kRuns = 400;
   for (int run = 0; run < kRuns; ++run)
@@ -60,7 +50,7 @@ TEST(Lamps, TheMeanOfManySmallRunsHasNoBias) {
 /// Where samples agree they are all that is taken, with the value of as many; near the lamp's edge more are, and the
 /// error falls.
 TEST(Lamps, OnlyPointsWithALargeErrorTakeMoreRays) {
-  const Scene scene = lamp_scene(0.01F, 1);
+  const Scene scene = testing::lamp_scene(0.01F, 1);
   Threads threads(1);
   const Tracer tracer(scene, threads);
   const Lamps lamps(tracer);
