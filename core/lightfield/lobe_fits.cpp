@@ -16,9 +16,10 @@
 namespace kiln {
 namespace {
 
-constexpr int kGrid = 48;          // samples a side, of the lobe and of the half space each
-constexpr double kGrazing = 2e-3;  // the least n.l
-constexpr double kHorizon = 0.1;   // n.v below which radiance counts as that of the horizon
+constexpr int kGrid = 48;               // samples a side, of the lobe and of the half space each
+constexpr double kGrazing = 2e-3;       // the least n.l
+constexpr double kUpright = 1 - 1e-12;  // the most
+constexpr double kHorizon = 0.1;        // n.v below which radiance counts as that of the horizon
 constexpr double kPi = std::numbers::pi;
 
 struct Node {
@@ -63,16 +64,19 @@ class Fitter {
   int order() const { return order_; }
   Eigen::VectorXd zeros() const { return Eigen::VectorXd::Zero(sh_count(order_)); }
 
-  /// Adds to the moments what the function brings there that is `light` (times solid angle) at v: Y, and where v is
+  /// Adds to the moments what functions bring there that are `light[k]` (times solid angle) at v: Y, and where v is
   /// near the horizon what the other half space goes on with.
-  void add(const Vec3d& v, double light, Eigen::VectorXd& moments) {
+  template <std::size_t kFunctions>
+  void add(const Vec3d& v, const std::array<double, kFunctions>& light,
+           std::array<Eigen::VectorXd, kFunctions>& moments) {
     evaluate_sh(order_, v, y_.data());
-    moments += light * y_;
-    if (v.z > kHorizon) return;
-    const double azimuth = std::atan2(v.y, v.x), share = kBelow * light / kHorizon;
-    for (int l = 0; l < order_; ++l) {
-      for (int m = 0; m <= l; ++m) moments[l * (l + 1) + m] += share * below_[l * (l + 1) + m] * std::cos(m * azimuth);
+    if (v.z <= kHorizon) {
+      const double azimuth = std::atan2(v.y, v.x), share = kBelow / kHorizon;
+      for (int l = 0; l < order_; ++l) {
+        for (int m = 0; m <= l; ++m) y_[l * (l + 1) + m] += share * below_[l * (l + 1) + m] * std::cos(m * azimuth);
+      }
     }
+    for (std::size_t k = 0; k < kFunctions; ++k) moments[k] += light[k] * y_;
   }
 
   Eigen::VectorXd solve(const Eigen::VectorXd& moments) const { return solver_.solve(moments); }
@@ -100,20 +104,20 @@ Parts lobe_parts(double alpha, const Vec3d& v, const Vec3d& l) {
   return {all * (1 - s), all * s};
 }
 
-/// Moments of the lobe of light from l by directions drawn from it and even ones, joined by the balance heuristic.
+/// Moments of the lobe of light from l by directions drawn from it and even ones, joined by the balance heuristic. Both
+/// are drawn on one side of the plane of l (x, z): their images on the other bring the same. l must not be upright.
 void fit_lobe(Fitter fitter, double alpha, const Vec3d& l, float* out) {
   std::array<Eigen::VectorXd, 2> moments{fitter.zeros(), fitter.zeros()};
   const auto add = [&](const Vec3d& v) {
     if (!(v.z > 0)) return;
     const Parts parts = lobe_parts(alpha, v, l);
-    const double solid = 1 / ((ggx_density(alpha, l, v) + 0.5 / kPi) * kGrid * kGrid);
-    fitter.add(v, parts.a * solid, moments[0]);
-    fitter.add(v, parts.b * solid, moments[1]);
+    const double solid = 2 / ((ggx_density(alpha, l, v) + 0.5 / kPi) * kGrid * kGrid);
+    fitter.add<2>(v, {parts.a * solid, parts.b * solid}, moments);
   };
   for (int i = 0; i < kGrid; ++i) {
-    for (int j = 0; j < kGrid; ++j) {
+    for (int j = 0; j < kGrid / 2; ++j) {
       const Vec2<double> u{(i + 0.5) / kGrid, (j + 0.5) / kGrid};
-      add(sample_ggx(alpha, l, u).l);
+      add(sample_ggx(alpha, l, {u.x, u.y - 0.25}).l);
       add(direction(u.x, 2 * kPi * u.y));
     }
   }
@@ -123,19 +127,23 @@ void fit_lobe(Fitter fitter, double alpha, const Vec3d& l, float* out) {
 }
 
 std::vector<float> fit_diffuse(Fitter fitter, const LobeTable& lobes, double roughness) {
-  Eigen::VectorXd moments = fitter.zeros();
+  std::array<Eigen::VectorXd, 1> moments{fitter.zeros()};
   constexpr int kHeights = 64, kAzimuths = 2 * kMaxShOrder;
   for (const Node& node : height_nodes(kHeights)) {
     const double light = (1 - lobe_at(lobes, node.z, roughness).kept()) * node.weight * 2 * kPi / kAzimuths;
-    for (int k = 0; k < kAzimuths; ++k) fitter.add(direction(node.z, 2 * kPi * k / kAzimuths), light, moments);
+    for (int k = 0; k < kAzimuths; ++k) fitter.add<1>(direction(node.z, 2 * kPi * k / kAzimuths), {light}, moments);
   }
-  const Eigen::VectorXd fit = fitter.solve(moments);
+  const Eigen::VectorXd fit = fitter.solve(moments[0]);
   std::vector<float> out;
   for (int l = 0; l < fitter.order(); ++l) out.push_back(static_cast<float>(fit[l * (l + 1)]));
   return out;
 }
 
 double roughness_of(std::size_t row) { return static_cast<double>(row) / (kFitRows - 1); }
+double row_place(double roughness) { return std::clamp(roughness, 0.0, 1.0) * (kFitRows - 1); }
+std::size_t row_below(double roughness) {
+  return static_cast<std::size_t>(std::min(row_place(roughness), kFitRows - 2.0));
+}
 
 void mix(std::vector<float>& a, const std::vector<float>& b, float share) {
   for (std::size_t i = 0; i < a.size(); ++i) a[i] += (b[i] - a[i]) * share;
@@ -143,29 +151,31 @@ void mix(std::vector<float>& a, const std::vector<float>& b, float share) {
 
 }  // namespace
 
-LobeFits::LobeFits(int degree, Threads& threads) : degree_(degree), rows_(kFitRows) {
+LobeFits::LobeFits(int degree, Threads& threads, const RoughnessRange& range) : degree_(degree), rows_(kFitRows) {
   EXPECTS(degree >= 0 && degree < kMaxShOrder);
+  EXPECTS(range.least <= range.most);
   const Fitter fitter(degree);
   const LobeTable lobes = make_lobe_table(1);
-  const std::size_t count = LobeFit::count(degree);
-  for (std::size_t row = 0; row < kFitRows; ++row) {
+  const std::size_t count = LobeFit::count(degree), first = row_below(range.least);
+  const std::size_t rows = row_below(range.most) + 2 - first;
+  for (std::size_t row = first; row < first + rows; ++row) {
     rows_[row] = {degree, std::vector<float>(kFitColumns * 2 * count), fit_diffuse(fitter, lobes, roughness_of(row))};
   }
-  threads.for_blocks(std::size_t{kFitRows} * kFitColumns, 1, [&](std::size_t begin, std::size_t end) {
+  threads.for_blocks(rows * kFitColumns, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t row = i / kFitColumns, column = i % kFitColumns;
+      const std::size_t row = first + i / kFitColumns, column = i % kFitColumns;
       const double angle = kPi / 2 * static_cast<double>(column) / (kFitColumns - 1);
-      const double z = std::max(kGrazing, std::cos(angle));
+      const double z = std::clamp(std::cos(angle), kGrazing, kUpright);
       fit_lobe(fitter, ggx_alpha(roughness_of(row)), direction(z, 0), &rows_[row].lobe[column * 2 * count]);
     }
   });
 }
 
 LobeFit LobeFits::at(double roughness) const {
-  const double place = std::clamp(roughness, 0.0, 1.0) * (kFitRows - 1);
-  const auto row = static_cast<std::size_t>(std::min(place, kFitRows - 2.0));
+  const std::size_t row = row_below(roughness);
+  EXPECTS(!rows_[row].lobe.empty() && !rows_[row + 1].lobe.empty());
   LobeFit out = rows_[row];
-  const auto share = static_cast<float>(place - static_cast<double>(row));
+  const auto share = static_cast<float>(row_place(roughness) - static_cast<double>(row));
   mix(out.lobe, rows_[row + 1].lobe, share);
   mix(out.diffuse, rows_[row + 1].diffuse, share);
   return out;

@@ -46,6 +46,15 @@ VertexMaterial material_at(const Scene& scene, std::uint32_t vertex, std::uint32
           emission_at(scene, p), finish.roughness};
 }
 
+RoughnessRange roughness_of(const Scene& scene, std::span<const std::uint32_t> faces) {
+  RoughnessRange out{1, 0};
+  for (std::uint32_t v = 0; v < faces.size(); ++v) {
+    const double roughness = material_at(scene, v, faces[v]).roughness;
+    out = {std::min(out.least, roughness), std::max(out.most, roughness)};
+  }
+  return faces.empty() ? RoughnessRange{} : out;
+}
+
 constexpr float kTurnedAway = -1;  // what a vertex sees of a lamp behind its horizon, until that is known
 constexpr std::size_t kNoLamp = static_cast<std::size_t>(-1);
 
@@ -190,12 +199,15 @@ struct VertexResult {
 /// Fits what each vertex sends.
 class VertexBake {
  public:
-  VertexBake(const IncidentLight::World& world, const OutgoingBake& params, std::span<const std::size_t> lamps,
-             Threads& threads)
+  struct Surface {
+    std::span<const std::uint32_t> faces;  // of vertices
+    std::span<const std::size_t> lamps;    // that are kept apart
+  };
+  VertexBake(const IncidentLight::World& world, const OutgoingBake& params, const Surface& surface, Threads& threads)
       : world_(world),
-        lamps_(lamps),
+        lamps_(surface.lamps),
         apart_(params.sky_apart && world.sky != nullptr),
-        fits_(params.degree, threads),
+        fits_(params.degree, threads, roughness_of(world.tracer.scene(), surface.faces)),
         norm_(params.degree),
         gather_(world, params) {
     if (apart_) sky_level_ = project_environment(*world.sky, 1)[0] / static_cast<float>(kWhite);
@@ -371,7 +383,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
   std::vector<std::size_t> lamps;
   if (params.lamps_apart) lamps = brightest_lamps(scene.lights, points);
-  const VertexBake vertex(world, params, lamps, threads);
+  const VertexBake vertex(world, params, {faces, lamps}, threads);
   const std::vector<std::uint32_t> order = morton_order_of(points);
   OutgoingLight out;
   out.field.degree = params.degree;

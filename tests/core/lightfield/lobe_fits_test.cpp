@@ -166,6 +166,16 @@ TEST(LobeFits, TurnWithTheLightAboutTheNormal) {
   }
 }
 
+TEST(LobeFits, OfARangeAreThoseOfAllFinishes) {
+  Threads threads(2);
+  const LobeFits all(3, threads), few(3, threads, {0.3, 0.42}), one(3, threads, {1, 1});
+  for (const double roughness : {0.3, 0.33, 0.375, 0.42}) {
+    EXPECT_EQ(few.at(roughness).lobe, all.at(roughness).lobe);
+    EXPECT_EQ(few.at(roughness).diffuse, all.at(roughness).diffuse);
+  }
+  EXPECT_EQ(one.at(1).lobe, all.at(1).lobe);
+}
+
 TEST(LobeFits, UnderAWhiteSkyShowTheDirectionalAlbedo) {
   Threads threads(2);
   const LobeFits fits(6, threads);
