@@ -1,0 +1,5 @@
+if(TARGET kiln_bake AND TARGET kiln_client)
+  add_executable(kiln_field_eyes field_eyes.cpp)
+  kiln_flags(kiln_field_eyes)
+  target_link_libraries(kiln_field_eyes PRIVATE kiln_client kiln_bake)
+endif()
