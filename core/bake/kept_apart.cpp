@@ -70,4 +70,17 @@ ApartDecision decide_lamps(const Scene& scene) {
   return {true, which + "surfaces of " + roughness + " mirror them as points"};
 }
 
+std::optional<std::string> softened_emitters(const Scene& scene, int degree) {
+  const bool glows = std::ranges::any_of(scene.parts, [&](const Part& part) {
+    const Vec3f& emission = scene.materials[static_cast<std::size_t>(part.material)].emission;
+    return dot(emission, emission) > 0;
+  });
+  if (!glows) return std::nullopt;
+  const double smooth = least_roughness(scene);
+  if (!(share_apart(smooth) > 0)) return std::nullopt;
+  return "surfaces of roughness " + short_text(smooth) + " show what glows by " + std::to_string(degree + 1) +
+         " bands only: soft, with rings around it; more bands (degree, at most 8) or punctual lamps in its place are "
+         "sharper";
+}
+
 }  // namespace kiln

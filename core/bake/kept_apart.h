@@ -4,6 +4,7 @@
 // smooth enough (share_apart), and of the sky where the bands that the series
 //         has leave more of its radiance out than storage may.
 
+#include <optional>
 #include <string>
 
 #include "core/bake/recipe.h"
@@ -21,6 +22,10 @@ struct ApartDecision {
 ApartDecision decide_sky(const Scene&, const Environment* sky, int degree, double share, SkyPart asked);
 
 ApartDecision decide_lamps(const Scene&);
+
+/// Surfaces that glow are never kept apart. Where a face is smooth enough to show them more sharply than bands 0 ..
+/// degree can, a sentence that says so.
+std::optional<std::string> softened_emitters(const Scene&, int degree);
 
 /// Of the sky's radiance over all directions: what bands 0 .. degree leave, root mean square relative to the mean.
 double left_by_bands(const Environment&, int degree);

@@ -148,6 +148,10 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   const ApartDecision lamps = decide_lamps(scene);
   f.outgoing.lamps_apart = lamps.apart;
   decide(plan, "lamps", lamps.apart ? "apart" : "in the series", lamps.reason);
+  if (const auto softened = softened_emitters(scene, f.outgoing.degree)) {
+    decide(plan, "emitters", "in the series", *softened);
+    plan.warnings.push_back({"emitters_mirrored_softly", "Of this scene " + *softened + ".", "/steps/0/degree"});
+  }
   decide_normal_maps(plan, scene);
   decide_simplification(plan, recipe);
   add_field_prediction(plan);

@@ -1,9 +1,12 @@
-// node make_field.mjs OUT.glb [lamps]: a small ball of brushed metal over a floor, for the fixtures of light fields
-// (fixtures/make_field.sh); with lamps a point, a spot and a sun above it.
+// node make_field.mjs OUT.glb [lamps] [smooth]: a small ball of brushed metal over a floor, for the fixtures of light
+// fields (fixtures/make_field.sh); with lamps a point, a spot and a sun above it. Smooth: of more triangles and
+// roughness .25, for the picture of tests/bench/lamps_picture.sh.
 
 import { writeFileSync } from 'node:fs';
 
-const [across, rings, radius, height] = [20, 12, 0.7, 0.75];
+const smooth = process.argv.includes('smooth');
+const [across, rings] = smooth ? [96, 64] : [20, 12];
+const [radius, height] = [0.7, 0.75];
 const ball = { position: [], normal: [], index: [] };
 for (let j = 0; j <= rings; ++j)
   for (let i = 0; i <= across; ++i) {
@@ -53,7 +56,7 @@ const json = {
   scenes: [{ nodes: [0] }],
   nodes: [{ mesh: 0 }],
   meshes: [{ primitives: [primitive(ball, 0), primitive(floor, 1)] }],
-  materials: [finish([0.95, 0.7, 0.35, 1], 1, 0.35), finish([0.6, 0.2, 0.15, 1], 0, 0.6)],
+  materials: [finish([0.95, 0.7, 0.35, 1], 1, smooth ? 0.25 : 0.35), finish([0.6, 0.2, 0.15, 1], 0, 0.6)],
   accessors,
   bufferViews: views,
   buffers: [{ byteLength: length }],

@@ -197,6 +197,20 @@ TEST(LightFieldSky, IsApartOnlyWhereSomethingMirrorsItTooSharply) {
   EXPECT_NE(choose(rough, &sun).reason.find("roughness 0.9"), std::string::npos) << choose(rough, &sun).reason;
 }
 
+TEST(LightFieldEmitters, AreNamedWhereSmoothSurfacesMirrorThem) {
+  const auto glowing = [](float roughness) {
+    Scene scene = metal_face(roughness);
+    scene.materials[0].emission = {0, 0, 2};
+    return scene;
+  };
+  EXPECT_FALSE(softened_emitters(metal_face(0.2F), 6));
+  EXPECT_FALSE(softened_emitters(glowing(0.9F), 6));
+  const auto said = softened_emitters(glowing(0.2F), 6);
+  ASSERT_TRUE(said);
+  EXPECT_NE(said->find("roughness 0.2"), std::string::npos) << *said;
+  EXPECT_NE(said->find("7 bands"), std::string::npos) << *said;
+}
+
 /// Bands 0 and 1 hold a sky that is a constant and a slope; a small lamp they do not.
 TEST(LightFieldSky, WhatBandsLeaveOut) {
   const auto sky = [](auto&& radiance) { return averaged_sky(64, 2, radiance); };

@@ -208,6 +208,20 @@ TEST(Recipe, OfAReductionNamesWhatIsWrong) {
             (std::vector<std::string>{"/quality"}));
 }
 
+TEST(Recipe, OfASimplificationNamesTargetsThatAreNone) {
+  const auto simplify = [](const std::string& target) {
+    return pointers(R"({"steps":[{"do":"lightfield","simplify":)" + target + "}]}");
+  };
+  const std::vector<std::string> ratio{"/steps/0/simplify/ratio"}, triangles{"/steps/0/simplify/triangles"};
+  for (const char* wrong : {"0", "-0.5", "1.5", "1e300", R"("half")", "null"})
+    EXPECT_EQ(simplify(R"({"ratio":)" + std::string(wrong) + "}"), ratio) << wrong;
+  for (const char* wrong : {"0", "3", "-9", "10.5", "1e300"})
+    EXPECT_EQ(simplify(R"({"triangles":)" + std::string(wrong) + "}"), triangles) << wrong;
+  EXPECT_EQ(simplify(R"({"max_error":1.5})"), (std::vector<std::string>{"/steps/0/simplify/max_error"}));
+  EXPECT_EQ(simplify(R"({"triangles":9,"ratio":0.5})"), ratio);
+  EXPECT_EQ(simplify(R"({"ratio":1})"), std::vector<std::string>{});
+}
+
 TEST(Recipe, PromisesOfAGridNeedAResolutionLeftOpen) {
   EXPECT_TRUE(parse_recipe(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid"}]})"));
   EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"grid","resolution":[4,4,4]}]})"),
