@@ -44,6 +44,16 @@ SurfaceReading::SurfaceReading(const Surface& surface, const Reading& reading, s
   }
 }
 
+SurfaceReading SurfaceReading::of_all(const Surface& surface, const std::vector<std::uint32_t>& computed,
+                                      int neighbours, const Compute& compute, Threads& threads) {
+  while (true) {
+    SurfaceReading reading(surface, computed, neighbours, threads);
+    const std::vector<std::uint32_t> unseen = reading.unseen();
+    if (unseen.empty()) return reading;
+    compute(along_curve(surface.points, unseen));
+  }
+}
+
 std::span<const BasisTerm> SurfaceReading::of_point(std::size_t point) const {
   return self_[point].value > 0 ? std::span(&self_[point], 1) : at_points_.terms(point);
 }
