@@ -190,7 +190,6 @@ int main(int argc, char** argv) {
       rows("eps .05, 128 rays", {.points = {.levels = 4}, .rays = 128, .eps = 0.05F, .paper = omega});
       rows("eps .04, 512 rays", {.points = {.levels = 4}, .eps = 0.04F, .paper = omega});
       rows("eps .02, 512 rays", {.points = {.levels = 4}, .eps = 0.02F, .paper = omega});
-      rows("the same, .1 sr", {.points = {.levels = 4}, .eps = 0.02F, .paper = 0.1F});
     }
     if (method == "vertices" || method == "all") {
       run_vertices(c, 64, 64, repeats, threads);

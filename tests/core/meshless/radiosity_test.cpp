@@ -11,6 +11,7 @@
 #include "core/meshless/anderson.h"
 #include "core/meshless/demand.h"
 #include "core/meshless/gather_rows.h"
+#include "core/meshless/paper_bounces.h"
 #include "core/meshless/senders.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -193,6 +194,43 @@ TEST(Radiosity, ComesToTheSameByRowsAndByThePapersScheme) {
   const double apart = std::sqrt(squares / n) / (sum / n);
   std::printf("reflected light of the two apart by %.4f\n", apart);
   EXPECT_LT(apart, 0.08);
+}
+
+TEST(Radiosity, ByThePapersSchemeInAWhiteFurnaceIsEmissionOverOneMinusAlbedo) {
+  for (const float rho : {0.5F, 0.9F, 0.99F}) {
+    Scene scene = testing::empty_scene();
+    testing::add_box(scene, {-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}, 4, true,
+                     add_lit_part(scene, {rho, rho, rho}, {1, 1, 1}));
+    const RadiosityResult r =
+        solve(scene, {.points = {.levels = 3, .wanted = 500}, .rays = 32, .paper = kPaperSolidAngle});
+    for (std::size_t v = 0; v < r.direct.size(); ++v) {
+      // As by rows; what is left after the last of 64 bounces is a geometric series here, to the letter.
+      EXPECT_NEAR((r.direct[v].x + r.indirect[v].x) * (1 - rho), 1, 4e-3 + 2e-5 / (1 - double{rho})) << rho;
+    }
+  }
+}
+
+TEST(Radiosity, ByThePapersSchemeIsTheSameForAnyThreadCountAndStandsDirt) {
+  const Scene room = lamp_room();
+  const Radiosity params{.points = {.levels = 3, .wanted = 600}, .rays = 32, .bounces = 2, .paper = kPaperSolidAngle};
+  const RadiosityResult one = solve(room, params, nullptr, 1), three = solve(room, params, nullptr, 3);
+  EXPECT_EQ(one.indirect, three.indirect);
+  EXPECT_EQ(one.stats.gather_rays, three.stats.gather_rays);
+  EXPECT_EQ(one.stats.sweeps, 2);
+  EXPECT_TRUE(solve(testing::empty_scene(), params).direct.empty());
+  const RadiosityResult dark = solve(testing::room_scene(), params);
+  for (const Vec3f& x : dark.indirect) EXPECT_EQ(x, Vec3f{});
+  Scene dirt = testing::random_scene(2, 60);
+  for (Material& m : dirt.materials) m.double_sided = true;
+  const Environment sky = constant_sky({1, 1, 1});
+  for (const float radius : {0.1F, 10.0F}) {
+    Radiosity own = params;
+    own.points = {.radius = radius, .levels = 2};
+    for (const Vec3f& x : solve(dirt, own, &sky).indirect) {
+      // What coarse functions carry through sheets may add up: they know no sight.
+      ASSERT_TRUE(is_finite(x) && x.x >= 0 && x.x <= 3) << x.x;
+    }
+  }
 }
 
 TEST(Radiosity, FollowsLightOnBacksOfDoubleSidedFaces) {
