@@ -55,21 +55,18 @@ Result<CarriedScene> read_scene(const BakeInput& input) {
 
 std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + (1U << 20) - 1) >> 20) + " MB"; }
 
-Result<void> check_memory(const Plan& plan, const Recipe& recipe) {
-  const std::uint64_t allowed = recipe.limits.memory_mb;
-  const std::string step = recipe.light_step();
+Result<void> check_memory(const Plan& plan, const Limits& limits) {
   const bool carried = plan.field && plan.field->carried;
-  if (plan.prediction.memory_bytes <= allowed << 20) return {};
+  if (plan.prediction.memory_bytes <= limits.memory_mb << 20) return {};
   return fault(
       "memory_limit",
       "the bake would need about " + megabytes(plan.prediction.memory_bytes) + " and limits.memory_mb allows " +
-          std::to_string(allowed) + " MB; " +
-          (carried     ? "give the file fewer vertices"
-           : plan.grid ? "lower " + step + "/resolution"
-           : plan.meshless
-               ? "raise " + step + "/points/radius, lower " + step + "/subdivide/triangles or " + step + "/order"
-           : plan.radiosity ? "raise " + step + "/points/radius, lower " + step + "/rays or subdivide/triangles"
-                            : "lower " + step + "/subdivide/triangles or " + step + "/order") +
+          std::to_string(limits.memory_mb) + " MB; " +
+          (carried          ? "give the file fewer vertices"
+           : plan.grid      ? "lower /steps/0/resolution"
+           : plan.meshless  ? "raise /steps/0/points/radius, lower /steps/0/subdivide/triangles or /steps/0/order"
+           : plan.radiosity ? "raise /steps/0/points/radius, lower /steps/0/rays or subdivide/triangles"
+                            : "lower /steps/0/subdivide/triangles or /steps/0/order") +
           ", or raise the limit");
 }
 
@@ -433,7 +430,7 @@ Result<BakeOutput> bake(const BakeInput& input, const Progress& progress, Thread
 
   log.begin("plan", 0.06);
   KILN_TRY(plan, plan_of(in, input.recipe, light, threads));
-  if (auto memory = check_memory(plan, input.recipe); !memory) return tl::make_unexpected(memory.error());
+  if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   if (!light && !plan.lamps && !in.carries_light()) {
     scene.warnings.push_back(
@@ -493,7 +490,7 @@ Result<std::string> plan_json(const BakeInput& input, Threads& threads) {
   Scene& scene = in.scene;
   KILN_TRY(light, job_light(input));
   KILN_TRY(plan, plan_of(in, input.recipe, light, threads));
-  if (auto memory = check_memory(plan, input.recipe); !memory) return tl::make_unexpected(memory.error());
+  if (auto memory = check_memory(plan, input.recipe.limits); !memory) return tl::make_unexpected(memory.error());
   scene.warnings.insert(scene.warnings.end(), plan.warnings.begin(), plan.warnings.end());
   return plan_report_json(plan, scene, input.recipe.promise);
 }

@@ -16,8 +16,9 @@ constexpr double kTexelsAVertex = 4;  // for about the error of the vertices (RE
 constexpr double kPackedFill = 0.7;   // of the picture that packed charts are taken to cover
 constexpr int kSideStep = 64, kLeastSide = 64, kMostSide = 8192;
 constexpr std::size_t kBlock = 256;
-constexpr float kEdge = 0.25F;  // of the brighter of two texels and of the mean: a jump of direct light
-constexpr int kParts = 4;       // along a side of a texel at a jump
+constexpr float kEdge = 0.25F;     // of the brighter of two texels and of the mean: a jump of direct light
+constexpr std::uint32_t kFew = 2;  // texels of a chart whose light is a mean all over them: no neighbour tells of jumps
+constexpr int kParts = 4;          // along a side of a texel at a jump
 
 std::string percent(double share) { return short_text(100 * share) + " %"; }
 
@@ -67,14 +68,8 @@ int side_for(double texels, double covered) {
   return std::clamp(static_cast<int>(steps) * kSideStep, kLeastSide, kMostSide);
 }
 
-/// What plan_lightmap finds, and where warnings of it point.
-struct Notes {
-  Plan& plan;
-  std::string where;
-};
-
-void warn(const Notes& notes, std::string code, std::string message) {
-  notes.plan.warnings.push_back({std::move(code), std::move(message), notes.where});
+void warn(Plan& plan, std::string code, std::string message) {
+  plan.warnings.push_back({std::move(code), std::move(message), "/steps/0/deliver"});
 }
 
 std::string names_of(const Scene& scene, const std::vector<char>& marked) {
@@ -90,7 +85,7 @@ std::string names_of(const Scene& scene, const std::vector<char>& marked) {
 }
 
 /// The parts of `parts` that may not get other coordinates, since their textures lie there, leave it.
-void leave_textured(const Scene& scene, std::vector<char>& parts, const Notes& notes) {
+void leave_textured(const Scene& scene, std::vector<char>& parts, Plan& plan) {
   std::vector<char> left(parts.size(), 0);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Material& material = scene.materials[static_cast<std::size_t>(scene.parts[i].material)];
@@ -98,7 +93,7 @@ void leave_textured(const Scene& scene, std::vector<char>& parts, const Notes& n
     left[i] = 1, parts[i] = 0;
   }
   if (std::ranges::count(left, 1) == 0) return;
-  warn(notes, "lightmap_coordinates_in_use",
+  warn(plan, "lightmap_coordinates_in_use",
        "Textures lie on TEXCOORD_1 of " + names_of(scene, left) +
            ", which is no layout for one lightmap: these parts keep the light of their vertices.");
 }
@@ -113,13 +108,13 @@ std::string reason_to_pack(const Mesh& mesh, const UvCharts& charts, const Coord
   return across > kTolerated ? percent(across) + " of the texels lie in two charts" : std::string{};
 }
 
-void warn_of_map(const TexelMap& map, const Coordinates& found, const Notes& notes) {
+void warn_of_map(const TexelMap& map, const Coordinates& found, Plan& plan) {
   const double twice = map.inside > 0 ? double(map.within + map.across) / double(map.inside) : 0;
   if (twice > kNoticed)
-    warn(notes, "lightmap_charts_overlap",
+    warn(plan, "lightmap_charts_overlap",
          percent(twice) + " of the texels lie in two triangles: they show the light of one of them.");
   if (found.flat > kNoticed)
-    warn(notes, "lightmap_charts_flat",
+    warn(plan, "lightmap_charts_flat",
          percent(found.flat) + " of the surface has no area in TEXCOORD_1: it shows the light of a line or a dot.");
 }
 
@@ -135,16 +130,15 @@ TransferPoint place_on(const Mesh& mesh, std::uint32_t triangle, float u, float 
 constexpr double kPixelBytes = 110;  // while a picture is laid out, filled, written and read back
 
 /// Before anything of its size is made.
-Result<void> check_picture(int side, const Plan& plan, const Recipe& recipe) {
+Result<void> check_picture(int side, const Plan& plan, const Limits& limits) {
   const double bytes = static_cast<double>(plan.prediction.memory_bytes) + kPixelBytes * side * side;
-  const std::uint64_t allowed = recipe.limits.memory_mb;
-  if (bytes <= static_cast<double>(allowed << 20)) return {};
+  if (bytes <= static_cast<double>(limits.memory_mb << 20)) return {};
   return fault("memory_limit",
                "a lightmap of " + std::to_string(side) + " x " + std::to_string(side) + " would need about " +
                    std::to_string(static_cast<std::uint64_t>(bytes) >> 20) +
-                   " MB with the bake and limits.memory_mb allows " + std::to_string(allowed) + " MB; lower " +
-                   recipe.light_step() + "/lightmap/size, or raise the limit",
-               recipe.light_step() + "/lightmap/size");
+                   " MB with the bake and limits.memory_mb allows " + std::to_string(limits.memory_mb) +
+                   " MB; lower /steps/0/lightmap/size, or raise the limit",
+               "/steps/0/lightmap/size");
 }
 
 /// Seconds, memory and bytes of so many texels: as of vertices, and the picture. Measured on Cornell and the chair.
@@ -169,15 +163,14 @@ Result<void> plan_lightmap(const Scene& scene, const Recipe& recipe, Plan& plan)
     out.parts.push_back(part.has_uv1 ? 1 : 0);
     missing.push_back(part.has_uv1 ? 0 : 1);
   }
-  const std::string deliver = recipe.light_step() + "/deliver", size = recipe.light_step() + "/lightmap/size";
-  const Notes notes{plan, deliver};
-  const auto refuse = [&](const std::string& what) {
+  const auto refuse = [](const std::string& what) {
     return fault("no_lightmap_coordinates",
-                 what + "; take lightmap out of " + deliver + ", or unwrap the model into TEXCOORD_1", deliver);
+                 what + "; take lightmap out of /steps/0/deliver, or unwrap the model into TEXCOORD_1",
+                 "/steps/0/deliver");
   };
   if (!any(out.parts)) return refuse("no primitive has TEXCOORD_1, which a lightmap lies on");
   if (any(missing))
-    warn(notes, "lightmap_parts_missing",
+    warn(plan, "lightmap_parts_missing",
          "No TEXCOORD_1 on " + names_of(scene, missing) + ": these parts keep the light of their vertices.");
 
   UvCharts charts = find_uv_charts(mesh, shown_triangles(mesh, out.parts));
@@ -185,30 +178,30 @@ Result<void> plan_lightmap(const Scene& scene, const Recipe& recipe, Plan& plan)
   const double vertices = 0.55 * static_cast<double>(mesh.triangles.size() + plan.triangles_of_quality);
   const double wanted = kTexelsAVertex * vertices;
   out.side = step.lightmap_size.value_or(side_for(wanted, found.area));
-  if (auto fits = check_picture(out.side, plan, recipe); !fits) return fits;
+  if (auto fits = check_picture(out.side, plan, recipe.limits); !fits) return fits;
   const std::string reason = reason_to_pack(mesh, charts, found, out.side);
   Mesh laid_out = mesh;
   if (!reason.empty()) {
-    leave_textured(scene, out.parts, notes);
+    leave_textured(scene, out.parts, plan);
     if (!any(out.parts)) return refuse(reason + ", and textures lie there");
     out.side = step.lightmap_size.value_or(side_for(wanted, kPackedFill));
-    if (auto fits = check_picture(out.side, plan, recipe); !fits) return fits;
+    if (auto fits = check_picture(out.side, plan, recipe.limits); !fits) return fits;
     charts = find_uv_charts(mesh, shown_triangles(mesh, out.parts));
     auto packed = pack_uv_charts(mesh, charts, out.side);
     if (!packed)
       return fault("lightmap_too_small",
                    "the " + std::to_string(charts.count) + " charts of TEXCOORD_1 do not fit into " +
-                       std::to_string(out.side) + " x " + std::to_string(out.side) + " texels; raise " + size +
-                       " (at most 8192)",
-                   size);
-    warn(notes, "lightmap_charts_packed",
+                       std::to_string(out.side) + " x " + std::to_string(out.side) +
+                       " texels; raise /steps/0/lightmap/size (at most 8192)",
+                   "/steps/0/lightmap/size");
+    warn(plan, "lightmap_charts_packed",
          reason + ": charts were packed anew, and TEXCOORD_1 of scene.glb is that of the lightmap.");
     laid_out.uv1 = *packed;
     out.uv1 = std::move(*packed);
     found = look_at(laid_out, charts);
   }
   const TexelMap map = map_texels(laid_out, charts, out.side);
-  warn_of_map(map, found, notes);
+  warn_of_map(map, found, plan);
   decide(plan, "lightmap", std::to_string(out.side) + " x " + std::to_string(out.side),
          step.lightmap_size ? "asked for by the recipe"
                             : "about " + short_text(kTexelsAVertex) + " texels for each vertex of this quality");
@@ -240,7 +233,14 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
     for (std::size_t i = begin; i < end; ++i) {
       const TexelPlace& at = map_.places[i];
       all[i] = place_on(mesh, at.triangle, at.u, at.v);
-      seen[i] = hidden(all[i]) ? 0 : 1;
+      if (!hidden(all[i])) {
+        seen[i] = 1;
+        continue;
+      }
+      std::vector<TransferPoint> parts;
+      add_parts(at, parts);
+      const auto open = std::ranges::find_if(parts, [&](const TransferPoint& p) { return !hidden(p); });
+      if (open != parts.end()) all[i] = *open, seen[i] = 1;
     }
   });
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -251,9 +251,8 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
   }
 }
 
-/// Places all over texel `place`, as far as its own triangle reaches.
-void LightmapStep::add_parts(std::size_t place, std::vector<TransferPoint>& out) const {
-  const TexelPlace& at = map_.places[of_map_[place]];
+/// Places all over a texel, as far as its own triangle reaches.
+void LightmapStep::add_parts(const TexelPlace& at, std::vector<TransferPoint>& out) const {
   std::array<Vec2d, 3> c;  // in texels
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec2f& uv = surface_.uv1[surface_.triangles[at.triangle][k]];
@@ -280,10 +279,13 @@ std::vector<Vec3f> LightmapStep::softened(const LitPlaces& lit, Threads& threads
     const float apart = largest(lit.direct[a] - lit.direct[b]);
     return apart > kEdge * std::max({largest(lit.direct[a]), largest(lit.direct[b]), static_cast<float>(mean)});
   });
+  const auto chart_of = [&](std::size_t i) { return charts_.of[map_.places[of_map_[i]].triangle]; };
+  std::vector<std::uint32_t> texels(charts_.count);  // of each chart
+  for (std::size_t i = 0; i < out.size(); ++i) ++texels[chart_of(i)];
   std::vector<TransferPoint> parts;
   std::vector<std::uint32_t> of;  // the place of each
   for (std::size_t i = 0; i < edge.size(); ++i) {
-    if (edge[i] != 0) add_parts(i, parts);
+    if (edge[i] != 0 || texels[chart_of(i)] <= kFew) add_parts(map_.places[of_map_[i]], parts);
     of.resize(parts.size(), static_cast<std::uint32_t>(i));
   }
   const std::vector<Vec3f> light = lit.direct_at(parts);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/radiosity.h"
 #include "core/prt/direction_sets.h"
 #include "core/prt/ray_origin.h"
@@ -43,14 +45,15 @@ class Series {
     if (points_.empty()) return std::move(out_);
     sent_ = basis_.coefficients(direct, threads_);  // e
     deepest_ = basis_.levels();
-    double light = mean_on_coarsest(direct), before = light, ratio = 0;
+    roots_ = find_roots();
+    double light = mean_light(sent_), before = light, ratio = 0;
     light_ = light;
     const bool automatic = params_.bounces < 0;
     const int most = automatic ? kMostPaperBounces : params_.bounces;
     for (int bounce = 0; bounce < most; ++bounce) {
       compute_bounce();
       for (std::size_t p = 0; p < points_.size(); ++p) out_.coefficients[p] += sent_[p];
-      const double now = mean_on_coarsest(sent_);
+      const double now = mean_light(sent_);
       light += now;
       ratio = before > 0 ? std::min(kSlowest, now / before) : 0;
       before = now;
@@ -68,11 +71,27 @@ class Series {
  private:
   using Points = std::vector<std::uint32_t>;
 
-  /// Of values, which are the coefficients there.
-  double mean_on_coarsest(std::span<const Vec3f> values) const {
-    double sum = 0;
-    for (std::uint32_t p = 0; p < basis_.level_end(0); ++p) sum += mean_of(values[p]);
-    return sum / std::max(1U, basis_.level_end(0));
+  /// Mean over the points of what the coefficients say there.
+  double mean_light(std::span<const Vec3f> coefficients) const {
+    std::vector<double> light(points_.size());
+    threads_.for_blocks(light.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) {
+        const SurfaceSite& site = basis_.site(static_cast<std::uint32_t>(p));
+        light[p] = std::max(0.0, mean_of(basis_.evaluate(coefficients, site, basis_.levels())));
+      }
+    });
+    return std::accumulate(light.begin(), light.end(), 0.0) / static_cast<double>(light.size());
+  }
+
+  /// Points with no function of a coarser level around them: all of the coarsest, and the coarsest of each group.
+  Points find_roots() const {
+    Points out;
+    std::vector<BasisTerm> terms;
+    for (std::uint32_t p = 0; p < points_.size(); ++p) {
+      terms.clear();
+      if (basis_.terms(basis_.site(p), basis_.level_of(p), terms) != Cover::functions) out.push_back(p);
+    }
+    return out;
   }
 
   /// From i_k in sent_ to i_{k+1}.
@@ -81,10 +100,11 @@ class Series {
     next_.assign(points_.size(), {});
     known_.assign(points_.size(), 0);
     Points fresh;
-    for (std::uint32_t p = 0; p < basis_.level_end(0); ++p) take(p, fresh);
+    for (const std::uint32_t p : roots_) take(p, fresh);
+    fresh = with_parents(std::move(fresh));
     gather(fresh);
-    if (out_.bounces == 0) light_ += mean_on_coarsest(next_);
-    std::size_t deepest = 1;
+    if (out_.bounces == 0) light_ += mean_light(next_);
+    std::size_t deepest = basis_.level_of(fresh.back()) + 1;
     while (!(fresh = with_parents(children_of(asking(fresh)))).empty()) {
       gather(fresh);
       deepest = std::max(deepest, basis_.level_of(fresh.back()) + 1);
@@ -123,8 +143,9 @@ class Series {
         const Vec3f w{rays.dx[i], rays.dy[i], rays.dz[i]};
         const HitSide side = world_.faces.side(hits.triangle[i], w);
         if (side == HitSide::dark) continue;
-        const MeshlessPoint at =
+        MeshlessPoint at =
             point_on(world_.tracer.scene(), hits.triangle[i], {hits.u[i], hits.v[i]}, side == HitSide::flipped);
+        at.site.group = group_of(world_.tracer, transfer_point(at), world_.cover);
         const auto draw = static_cast<std::uint32_t>(random.next());
         const Vec3f albedo = albedo_at(hits.triangle[i], hits.u[i], hits.v[i], draw);
         sum += albedo * light_at(at.site, origin, terms);
@@ -141,14 +162,17 @@ class Series {
   /// i_k at a place, down to the level that is fine enough from `eye`.
   Vec3f light_at(const SurfaceSite& site, const Vec3f& eye, std::vector<BasisTerm>& terms) const {
     Vec3f sum;
+    bool found = false;
     for (std::size_t level = 0; level < deepest_; ++level) {
       terms.clear();
       if (!basis_.terms_of(level, site, terms)) {
-        if (level > 0) continue;
-        const std::uint32_t nearest = basis_.nearest(site, 0);
-        if (nearest != MeshlessBasis::kNoFunction) sum = sent_[nearest];
+        if (found) continue;
+        const std::uint32_t nearest = basis_.nearest(site, level);
+        found = nearest != MeshlessBasis::kNoFunction;
+        if (found) sum = sent_[nearest];
         continue;
       }
+      found = true;
       float angles = 0;
       for (const BasisTerm& t : terms) {
         sum += sent_[t.function] * t.value;
@@ -238,6 +262,7 @@ class Series {
   const PaperBounces& params_;
   Threads& threads_;
   const DirectionSets sets_;
+  Points roots_;
   std::vector<Vec3f> sent_;          // i_k
   std::size_t deepest_ = 0;          // levels of it that are not all 0
   std::vector<Vec3f> value_, next_;  // what was gathered, i_{k+1}

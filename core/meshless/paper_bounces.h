@@ -1,7 +1,8 @@
 #pragma once
 // Reflected light by the paper's own scheme: bounce by bounce, with the basis evaluated wherever a ray lands.
 //   i_0 = e,   i_{k+1} = T i_k,   r = i_1 + i_2 + ...     each the coefficients of a function (basis.h, equation 9) (1)
-// Bounce  COMPUTE-BOUNCE gathers at all points of the coarsest level, then at the children of those that the oracle
+// Bounce  COMPUTE-BOUNCE gathers at all points of the coarsest level (and those that no coarser function reaches), then
+// at the children of those that the oracle
 //         asks for: points of the next level whose functions are not 0 there. A finer coefficient is a difference
 //         (equation 10), so the points of all coarser functions that are not 0 at a point are gathered at before it.
 // Oracle  RECEIVER-ORACLE asks for children on the coarsest level where light differs by more than eps from that of a
@@ -11,6 +12,7 @@
 // Series  ends when less than kTail of the light (radiosity.h) is left, or after kMostPaperBounces; what is left counts
 //         as a geometric series of the last term. Where the number of bounces is given it is just those.
 // Paper   Lehtinen et al. 2007, section 6.3.
+// Groups  are those of cover.h: one more short ray where a ray lands.
 // Differs eps is in parts of the mean light; rays are those of gather_rows.h, not one Hammersley set. As in the paper
 //         nothing asks who sees whom: coarse functions reach through walls, and finer ones correct that where asked
 //         for.
@@ -55,6 +57,7 @@ struct PaperWorld {
   const Tracer& tracer;
   const GatherFaces& faces;
   const HitAlbedo& albedo;
+  float cover = 0;  // of the points: places in gaps are a reconstruction group of their own (cover.h)
 };
 
 /// `points` and `direct`, their direct light, are those of the basis.

@@ -7,6 +7,7 @@
 #include "core/base/random.h"
 #include "core/meshless/adaptive_points.h"
 #include "core/meshless/anderson.h"
+#include "core/meshless/cover.h"
 #include "core/meshless/gather_rows.h"
 #include "core/meshless/paper_bounces.h"
 #include "core/meshless/surface_reading.h"
@@ -183,15 +184,18 @@ class Solver {
     const std::vector<std::uint32_t> ends(points().level_end.begin(),
                                           points().level_end.begin() + points().placed_levels());
     const std::size_t placed = ends.empty() ? 0 : ends.back();
-    const auto site_of = [](const TransferPoint& p) { return SurfaceSite{p.position, p.normal, 0}; };
+    const auto site_of = [this](const TransferPoint& p) {
+      return SurfaceSite{p.position, p.normal, group_of(tracer_, p, points().cover)};
+    };
     std::vector<SurfaceSite> sites;
-    for (std::size_t p = 0; p < placed; ++p) sites.push_back(site_of(at_[p]));
+    for (std::size_t p = 0; p < placed; ++p) sites.push_back(points().points[p].site);
     const MeshlessBasis basis(sites, ends, threads_, params_.neighbours);
     begin_stage("bounces");
     const SenderPaths::World& world = out_.surface->paths().world();
-    const PaperLight light = bounce_on_basis(
-        {tracer_, world.faces, world.albedo}, basis, std::span(at_).first(placed), std::span(direct_).first(placed),
-        {params_.rays, params_.eps, *params_.paper, params_.bounces, params_.seed}, threads_);
+    const PaperLight light =
+        bounce_on_basis({tracer_, world.faces, world.albedo, points().cover}, basis, std::span(at_).first(placed),
+                        std::span(direct_).first(placed),
+                        {params_.rays, params_.eps, *params_.paper, params_.bounces, params_.seed}, threads_);
     out_.stats.gather_rays += light.rays;
     out_.stats.sweeps = light.bounces;
     out_.stats.tail = light.tail;

@@ -28,8 +28,8 @@ class SurfaceReading {
   /// `computed` holds points, in the order of what is read.
   SurfaceReading(const Surface&, std::span<const std::uint32_t> computed, int neighbours, Threads&);
 
-  /// So that every point reads something: those that see nothing are computed too. `compute` is given them along the
-  /// Morton curve, and appends them to `computed`.
+  /// So that every point reads something: those that see nothing are computed too, and all is read anew, once.
+  /// `compute` is given them along the Morton curve, and appends them to `computed`.
   using Compute = std::function<void(std::span<const std::uint32_t> points)>;
   static SurfaceReading of_all(const Surface&, const std::vector<std::uint32_t>& computed, int neighbours,
                                const Compute& compute, Threads&);
@@ -42,6 +42,7 @@ class SurfaceReading {
 
  private:
   SurfaceReading(const Surface&, const Reading&, std::span<const std::uint32_t> computed, Threads&);
+  void let_read_themselves(std::span<const std::uint32_t> computed);
   std::vector<std::uint32_t> unseen() const;  // points that read nothing
 
   Readings at_points_, at_vertices_;

@@ -258,10 +258,7 @@ TEST(LightmapBake, OfAnEdgeOfShadowIsTheShareOfEachTexelThatIsLit) {
 TEST(LightmapBake, AfterReduceIsRefusedByItsOwnStep) {
   Threads threads;
   const auto refused = bake(
-      input_of(
-          glb_of(Room(beside), {.material = kFurnace}),
-          R"({"steps":[{"do":"reduce","triangles":12,"normal_map":"off"},{"do":"radiosity","deliver":["lightmap"]}],
-                   "quality":"draft"})"),
+      testing::input_of("room", R"({"steps":[{"do":"reduce","ratio":0.5},{"do":"radiosity","deliver":["lightmap"]}]})"),
       {}, threads);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "no_lightmap_coordinates");
