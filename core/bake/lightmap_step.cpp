@@ -16,9 +16,8 @@ constexpr double kTexelsAVertex = 4;  // for about the error of the vertices (RE
 constexpr double kPackedFill = 0.7;   // of the picture that packed charts are taken to cover
 constexpr int kSideStep = 64, kLeastSide = 64, kMostSide = 8192;
 constexpr std::size_t kBlock = 256;
-constexpr float kEdge = 0.25F;     // of the brighter of two texels and of the mean: a jump of direct light
-constexpr std::uint32_t kFew = 2;  // texels of a chart whose light is a mean all over them: no neighbour tells of jumps
-constexpr int kParts = 4;          // along a side of a texel at a jump
+constexpr float kEdge = 0.25F;  // of the brighter of two texels and of the mean: a jump of direct light
+constexpr int kParts = 4;       // along a side of a texel at a jump
 
 std::string percent(double share) { return short_text(100 * share) + " %"; }
 
@@ -233,14 +232,7 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
     for (std::size_t i = begin; i < end; ++i) {
       const TexelPlace& at = map_.places[i];
       all[i] = place_on(mesh, at.triangle, at.u, at.v);
-      if (!hidden(all[i])) {
-        seen[i] = 1;
-        continue;
-      }
-      std::vector<TransferPoint> parts;
-      add_parts(at, parts);
-      const auto open = std::ranges::find_if(parts, [&](const TransferPoint& p) { return !hidden(p); });
-      if (open != parts.end()) all[i] = *open, seen[i] = 1;
+      seen[i] = hidden(all[i]) ? 0 : 1;
     }
   });
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -251,8 +243,9 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
   }
 }
 
-/// Places all over a texel, as far as its own triangle reaches.
-void LightmapStep::add_parts(const TexelPlace& at, std::vector<TransferPoint>& out) const {
+/// Places all over texel `place`, as far as its own triangle reaches.
+void LightmapStep::add_parts(std::size_t place, std::vector<TransferPoint>& out) const {
+  const TexelPlace& at = map_.places[of_map_[place]];
   std::array<Vec2d, 3> c;  // in texels
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec2f& uv = surface_.uv1[surface_.triangles[at.triangle][k]];
@@ -279,13 +272,10 @@ std::vector<Vec3f> LightmapStep::softened(const LitPlaces& lit, Threads& threads
     const float apart = largest(lit.direct[a] - lit.direct[b]);
     return apart > kEdge * std::max({largest(lit.direct[a]), largest(lit.direct[b]), static_cast<float>(mean)});
   });
-  const auto chart_of = [&](std::size_t i) { return charts_.of[map_.places[of_map_[i]].triangle]; };
-  std::vector<std::uint32_t> texels(charts_.count);  // of each chart
-  for (std::size_t i = 0; i < out.size(); ++i) ++texels[chart_of(i)];
   std::vector<TransferPoint> parts;
   std::vector<std::uint32_t> of;  // the place of each
   for (std::size_t i = 0; i < edge.size(); ++i) {
-    if (edge[i] != 0 || texels[chart_of(i)] <= kFew) add_parts(map_.places[of_map_[i]], parts);
+    if (edge[i] != 0) add_parts(i, parts);
     of.resize(parts.size(), static_cast<std::uint32_t>(i));
   }
   const std::vector<Vec3f> light = lit.direct_at(parts);

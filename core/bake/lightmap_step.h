@@ -5,9 +5,7 @@
 //          as a vertex is: direct light in full, reflected light read from the points that it sees.
 // Edges    Where direct light jumps from one texel to the next, each of the two takes the mean over its own area: a
 //          shadow has a soft step instead of teeth, as bilinear filtering wants it.
-//          So does each texel of a chart of one or two.
-// Filled   Of a texel whose middle is inside a solid another part is taken that is not. Those wholly inside take their
-//          light from the chart around them, those of no chart from their neighbours.
+// Filled   Texels inside solids take their light from the chart around them, those of no chart from their neighbours.
 // Seams    The two sides of a seam agree (core/mesh/texel_seams.h).
 // Layout   The author's where it is one for the whole scene, else packed anew (core/mesh/uv_charts.h). Instances are
 //          written out and never share texels.
@@ -67,7 +65,7 @@ class LightmapStep {
   std::vector<Vec3f> softened(const LitPlaces&, Threads&) const;
   template <class Differs>
   std::vector<char> edges(const Differs&) const;
-  void add_parts(const TexelPlace&, std::vector<TransferPoint>&) const;
+  void add_parts(std::size_t place, std::vector<TransferPoint>&) const;
 
   Mesh surface_;  // of the input
   UvCharts charts_;
