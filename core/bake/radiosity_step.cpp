@@ -9,6 +9,7 @@
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/direct_light.h"
+#include "core/meshless/paper_bounces.h"
 #include "core/prt/ray_origin.h"
 #include "core/trace/surface.h"
 #include "core/trace/surface_samples.h"
@@ -166,7 +167,12 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, const Ra
   const std::string asked = "asked for by the recipe";
   decide(plan, "light", sky == nullptr ? "lamps" : sky->name,
          plan.lamps ? "the scene has emitters or punctual lights of its own" : "the scene has no light of its own");
-  decide(plan, "scheme", "rows", "the transport operator is traced once; bounces are sparse sweeps");
+  if (step.scheme == RadiosityStep::Scheme::paper) {
+    r.paper = static_cast<float>(step.eps_solid_angle.value_or(kPaperSolidAngle));
+    decide(plan, "scheme", "paper", "asked for by the recipe: each bounce evaluates the basis where rays land");
+  } else {
+    decide(plan, "scheme", "rows", "the transport operator is traced once; bounces are sparse sweeps");
+  }
   decide(plan, "points", points_text(plan, scene),
          step.radius
              ? asked

@@ -15,6 +15,7 @@ using nlohmann::json;
 constexpr std::int64_t kMaxBudget = 50'000'000;
 constexpr int kMostGridSide = 512;
 constexpr int kLeastMapSide = 64, kMostMapSide = 8192;
+constexpr double kWholeSphere = 12.566370614359172;  // sr
 constexpr int kLeastLightmap = 16, kMostLightmap = 8192;
 constexpr std::int64_t kMaxExactInteger = 9'007'199'254'740'991;  // 2^53 - 1: what a JSON number holds everywhere
 
@@ -159,7 +160,6 @@ RadiosityStep read_radiosity(JsonFields& fields, const std::string& pointer, Err
     const auto value = from.integer_or_auto(name, low, high);
     return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
   };
-  fields.word("scheme", {"rows"});
   if (const json* value = fields.find("points")) {
     JsonFields points(*value, pointer + "/points", errors);
     step.radius = points.number_or_auto("radius", 1e-9, 1e12);
@@ -193,6 +193,11 @@ RadiosityStep::Deliver read_deliver(const json& list, const std::string& pointer
 /// The step `radiosity` has what `transport` has, and says how the light is delivered.
 RadiosityStep read_delivered_radiosity(JsonFields& fields, const std::string& pointer, Errors& errors) {
   RadiosityStep step = read_radiosity(fields, pointer, errors);
+  constexpr RadiosityStep::Scheme kSchemes[] = {RadiosityStep::Scheme::rows, RadiosityStep::Scheme::paper};
+  if (const auto scheme = fields.word("scheme", {"rows", "paper"})) step.scheme = kSchemes[*scheme];
+  step.eps_solid_angle = fields.number_or_auto("eps_solid_angle", 0, kWholeSphere);
+  if (step.eps_solid_angle && step.scheme != RadiosityStep::Scheme::paper)
+    fields.error("eps_solid_angle", "is a knob of the paper's scheme alone", "scheme: paper");
   if (const json* value = fields.find("deliver")) step.deliver = read_deliver(*value, pointer + "/deliver", errors);
   if (const json* value = fields.find("lightmap")) {
     JsonFields lightmap(*value, pointer + "/lightmap", errors);
@@ -206,6 +211,7 @@ RadiosityStep read_delivered_radiosity(JsonFields& fields, const std::string& po
 
 TransportStep read_transport(JsonFields& fields, const std::string& pointer, Errors& errors) {
   TransportStep step{.surface = read_radiosity(fields, pointer, errors), .sender_level = {}};
+  fields.word("scheme", {"rows"});
   if (const auto level = fields.integer_or_auto("sender_level", 0, 11)) step.sender_level = static_cast<int>(*level);
   return step;
 }
@@ -360,13 +366,12 @@ void check_field_promise(const Recipe& recipe, Errors& errors) {
                       "a promise, or all of the knobs"});
   }
   if (s.max_error && target && *s.max_error > *target) {
-    errors.push_back({std::string(recipe.reduce ? "/steps/1" : "/steps/0") + "/simplify/max_error",
-                      "is more than /quality/target_error", shown(json(*s.max_error)),
-                      "at most " + shown(json(*target))});
+    errors.push_back({recipe.light_step() + "/simplify/max_error", "is more than /quality/target_error",
+                      shown(json(*s.max_error)), "at most " + shown(json(*target))});
   }
 }
 
-void check_points_promise(const RadiosityStep& step, Errors& errors) {
+void check_points_promise(const RadiosityStep& step, const std::string& step_pointer, Errors& errors) {
   const bool split_fixed = step.subdivide.mode == PrtStep::Subdivision::Mode::off || step.subdivide.triangles;
   if (step.rays && step.radius && split_fixed) {
     errors.push_back({"/quality", "leaves nothing to spend: rays, radius of points and triangles of the step are given",
@@ -374,15 +379,15 @@ void check_points_promise(const RadiosityStep& step, Errors& errors) {
   }
   if (!step.deliver.vertices) {
     errors.push_back({"/quality", "is proven of the light at vertices, which the step does not deliver", "",
-                      "/steps/0/deliver with vertices"});
+                      step_pointer + "/deliver with vertices"});
   }
 }
 
 /// A promise is about the certificate, and needs something to spend on.
 void check_promise(const Recipe& recipe, Errors& errors) {
   if (!recipe.promise) return;
-  if (recipe.radiosity) check_points_promise(*recipe.radiosity, errors);
-  if (recipe.transport) check_points_promise(recipe.transport->surface, errors);
+  if (recipe.radiosity) check_points_promise(*recipe.radiosity, recipe.light_step(), errors);
+  if (recipe.transport) check_points_promise(recipe.transport->surface, recipe.light_step(), errors);
   if (recipe.light_field) check_field_promise(recipe, errors);
   if (recipe.reduce && !recipe.bakes_light()) {
     errors.push_back({"/quality", "cannot be promised of a reduce step: triangles are what it is asked for", "",
@@ -392,7 +397,7 @@ void check_promise(const Recipe& recipe, Errors& errors) {
     errors.push_back({"/certificate", "must not be off: what /quality promises is what it proves", "false", "true"});
   if (recipe.grid && recipe.grid->resolution) {
     errors.push_back({"/quality", "leaves nothing to spend: the resolution of the grid is given", "",
-                      "a promise, or /steps/0/resolution"});
+                      "a promise, or " + recipe.light_step() + "/resolution"});
   }
   for (const PrtStep& step : recipe.steps) {
     const bool split_fixed = step.subdivide.mode == PrtStep::Subdivision::Mode::off || step.subdivide.triangles;

@@ -72,7 +72,9 @@ struct PrtStep {
 
 /// Light of one job at the vertices: no order, nothing to turn (core/meshless/radiosity.h).
 struct RadiosityStep {
-  std::optional<double> radius;  // of the coarsest points, in metres; auto when absent
+  enum class Scheme { rows, paper } scheme = Scheme::rows;  // of the step `radiosity`
+  std::optional<double> eps_solid_angle;                    // of the paper's scheme, sr
+  std::optional<double> radius;                             // of the coarsest points, in metres; auto when absent
   std::optional<int> levels;
   std::optional<double> eps_irradiance;  // prediction error that asks for finer points, of the mean light
   std::optional<int> rays;               // of a gather
@@ -164,6 +166,8 @@ struct Recipe {
   std::string label;
 
   bool bakes_light() const { return !steps.empty() || radiosity || grid || transport || light_field; }
+  /// The pointer of the step that bakes light: reduce comes before it.
+  std::string light_step() const { return reduce ? "/steps/1" : "/steps/0"; }
 };
 
 /// Parses and checks a recipe. All mistakes at once.

@@ -72,12 +72,13 @@ json step_json(const PrtStep& step) {
 /// `deliver` is left out where it is vertices alone, as above.
 json step_json(const RadiosityStep& step) {
   json out = {{"do", "radiosity"},
-              {"scheme", "rows"},
+              {"scheme", step.scheme == RadiosityStep::Scheme::paper ? "paper" : "rows"},
               {"points", {{"radius", or_auto(step.radius)}, {"levels", or_auto(step.levels)}}},
               {"eps_irradiance", or_auto(step.eps_irradiance)},
               {"rays", or_auto(step.rays)},
               {"bounces", or_auto(step.bounces)},
               {"subdivide", subdivision_json(step.subdivide)}};
+  if (step.scheme == RadiosityStep::Scheme::paper) out["eps_solid_angle"] = or_auto(step.eps_solid_angle);
   const RadiosityStep::Deliver& to = step.deliver;
   if (!to.lightmap && !to.points) return out;
   if (to.vertices) out["deliver"].push_back("vertices");

@@ -65,10 +65,14 @@ std::string recipe_schema() {
     },
     "radiosity": {
       "type": "object", "required": ["do"], "additionalProperties": false,
-      "not": {"required": ["lightmap"], "properties": {"deliver": {"not": {"contains": {"enum": ["lightmap"]}}}}},
+      "allOf": [
+        {"not": {"required": ["lightmap"], "properties": {"deliver": {"not": {"contains": {"enum": ["lightmap"]}}}}}},
+        {"anyOf": [{"required": ["scheme"], "properties": {"scheme": {"enum": ["paper"]}}}, {"properties": {"eps_solid_angle": {"$ref": "#/definitions/auto"}}}]}
+      ],
       "properties": {
         "do": {"enum": ["radiosity"]},
-        "scheme": {"$ref": "#/definitions/gather_scheme"},
+        "scheme": {"description": "rows: transport is traced once, bounces are sparse sweeps; paper: that of Lehtinen et al. 2007, slower, for comparison", "enum": ["rows", "paper"], "default": "rows"},
+        "eps_solid_angle": {"description": "scheme paper: solid angle, sr, below which functions where a ray lands are fine enough; auto: pi / 10", "anyOf": [{"type": "number", "minimum": 0, "maximum": 12.566370614359172}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "points": {"$ref": "#/definitions/gather_points"},
         "eps_irradiance": {"$ref": "#/definitions/eps_irradiance"},
         "rays": {"$ref": "#/definitions/gather_rays"},

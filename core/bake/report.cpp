@@ -290,16 +290,18 @@ ordered_json merge_object(const MergeOutcome& m) {
 
 ordered_json radiosity_parameters(const Plan& plan) {
   const Radiosity& r = *plan.radiosity;
-  return {{"scheme", "rows"},
-          {"radius_unit_cube", r.points.radius},
-          {"levels", r.points.levels},
-          {"rays", r.rays},
-          {"eps_irradiance", r.eps},
-          {"bounces", r.bounces < 0 ? ordered_json("auto") : ordered_json(r.bounces)},
-          {"lamp_rays", {r.direct.lamps.few, r.direct.lamps.many}},
-          {"sky_rays", r.direct.sky},
-          {"triangles", plan.subdivide.triangles},
-          {"threshold", plan.subdivide.threshold}};
+  ordered_json out = {{"scheme", r.paper ? "paper" : "rows"},
+                      {"radius_unit_cube", r.points.radius},
+                      {"levels", r.points.levels},
+                      {"rays", r.rays},
+                      {"eps_irradiance", r.eps},
+                      {"bounces", r.bounces < 0 ? ordered_json("auto") : ordered_json(r.bounces)},
+                      {"lamp_rays", {r.direct.lamps.few, r.direct.lamps.many}},
+                      {"sky_rays", r.direct.sky},
+                      {"triangles", plan.subdivide.triangles},
+                      {"threshold", plan.subdivide.threshold}};
+  if (r.paper) out["eps_solid_angle"] = *r.paper;
+  return out;
 }
 
 ordered_json field_parameters(const FieldPlan& field) {

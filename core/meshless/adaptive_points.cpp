@@ -7,7 +7,6 @@
 #include "core/meshless/cover.h"
 #include "core/meshless/point_grid.h"
 #include "core/meshless/reading.h"
-#include "core/prt/morton.h"
 
 namespace kiln {
 namespace {
@@ -104,10 +103,8 @@ class Refinement {
   }
 
   void compute(const std::vector<std::uint32_t>& points) {
-    std::vector<Vec3f> positions;
-    for (const std::uint32_t p : points) positions.push_back(points_.points[p].site.position);
     const std::size_t first = out_.size();
-    for (const std::uint32_t i : morton_order(positions)) out_.push_back(points[i]);
+    for (const std::uint32_t p : along_curve(points_, points)) out_.push_back(p);
     params_.compute(std::span(out_).subspan(first));
   }
 

@@ -106,6 +106,15 @@ std::uint32_t MeshlessBasis::nearest_of(const Level& level, const SurfaceSite& p
   return best;
 }
 
+bool MeshlessBasis::terms_of(std::size_t level, const SurfaceSite& p, std::vector<BasisTerm>& out) const {
+  return level_terms(levels_[level], p, out);
+}
+
+std::size_t MeshlessBasis::level_of(std::uint32_t function) const {
+  const auto above = std::ranges::upper_bound(levels_, function, {}, &Level::end);
+  return static_cast<std::size_t>(above - levels_.begin());
+}
+
 std::uint32_t MeshlessBasis::nearest(const SurfaceSite& p, std::size_t level) const {
   EXPECTS(level < levels_.size());
   return nearest_of(levels_[level], p);

@@ -42,11 +42,17 @@ class MeshlessBasis {
 
   std::size_t levels() const { return levels_.size(); }
   std::size_t functions() const { return sites_.size(); }
+  std::uint32_t level_end(std::size_t level) const { return levels_[level].end; }
+  std::size_t level_of(std::uint32_t function) const;
   float radius(std::uint32_t function) const { return radius_[function]; }
+  const SurfaceSite& site(std::uint32_t function) const { return sites_[function]; }
 
   /// Appends the functions of the first `levels` levels that are not 0 at p; those of one level add up to 1.
   /// Cover::none, and nothing appended, where no level has a compatible point.
   Cover terms(const SurfaceSite& p, std::size_t levels, std::vector<BasisTerm>& out) const;
+
+  /// Appends those of one level that are not 0 at p; false where there are none.
+  bool terms_of(std::size_t level, const SurfaceSite& p, std::vector<BasisTerm>& out) const;
 
   /// Equation 9 over the first `levels` levels.
   Vec3f evaluate(std::span<const Vec3f> coefficients, const SurfaceSite& p, std::size_t levels) const;

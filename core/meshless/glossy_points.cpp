@@ -83,7 +83,8 @@ class Solver {
     find_components();
     const std::vector<std::uint32_t> computed = compute();
     read_vertices();
-    count_levels(computed);
+    stats_.points = level_sizes(points_);
+    stats_.computed = count_by_level(points_, computed);
     return std::move(out_);
   }
 
@@ -228,15 +229,6 @@ class Solver {
     const std::vector<double> share = vertex_shares(tracer_.scene().mesh, vertices_);
     out_.left_out = std::sqrt(std::inner_product(share.begin(), share.end(), left.begin(), 0.0));
     out_.noise = noise_ * std::sqrt(std::inner_product(share.begin(), share.end(), shrink.begin(), 0.0));
-  }
-
-  void count_levels(const std::vector<std::uint32_t>& computed) {
-    const std::vector<std::uint32_t>& ends = points_.level_end;
-    stats_.computed.assign(ends.size(), 0);
-    for (std::size_t level = 0; level < ends.size(); ++level)
-      stats_.points.push_back(ends[level] - points_.begin(level));
-    for (const std::uint32_t p : computed)
-      ++stats_.computed[static_cast<std::size_t>(std::ranges::upper_bound(ends, p) - ends.begin())];
   }
 
   const Tracer& tracer_;

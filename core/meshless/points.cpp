@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <span>
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
 #include "core/mesh/topology.h"
 #include "core/meshless/cover.h"
 #include "core/meshless/point_grid.h"
+#include "core/prt/morton.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 
@@ -208,6 +208,28 @@ MeshlessPoint point_on(const Scene& scene, std::uint32_t triangle, const Vec2f& 
     p.behind = true;
   }
   return p;
+}
+
+std::vector<std::uint32_t> level_sizes(const PointHierarchy& points) {
+  std::vector<std::uint32_t> out;
+  for (std::size_t level = 0; level < points.levels(); ++level)
+    out.push_back(points.level_end[level] - points.begin(level));
+  return out;
+}
+
+std::vector<std::uint32_t> count_by_level(const PointHierarchy& points, std::span<const std::uint32_t> some) {
+  const std::vector<std::uint32_t>& ends = points.level_end;
+  std::vector<std::uint32_t> out(ends.size());
+  for (const std::uint32_t p : some) ++out[static_cast<std::size_t>(std::ranges::upper_bound(ends, p) - ends.begin())];
+  return out;
+}
+
+std::vector<std::uint32_t> along_curve(const PointHierarchy& points, std::span<const std::uint32_t> some) {
+  std::vector<Vec3f> positions;
+  for (const std::uint32_t p : some) positions.push_back(points.points[p].site.position);
+  std::vector<std::uint32_t> out;
+  for (const std::uint32_t i : morton_order(positions)) out.push_back(some[i]);
+  return out;
 }
 
 PointHierarchy place_points(const Tracer& tracer, const GatherFaces& faces, const PointPlacement& asked,

@@ -17,6 +17,7 @@
 // Repeat  a pure function of scene and parameters.   Fails   never; a surface without area has no points
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/threads.h"
@@ -76,6 +77,13 @@ double expected_points(double area, double radius);
 
 /// Of the parts that get points.
 double placed_area(const PointPlacement&, const Scene&);
+
+/// How many points there are on each level, and how many of some.
+std::vector<std::uint32_t> level_sizes(const PointHierarchy&);
+std::vector<std::uint32_t> count_by_level(const PointHierarchy&, std::span<const std::uint32_t> some);
+
+/// Points along the Morton curve of their places.
+std::vector<std::uint32_t> along_curve(const PointHierarchy&, std::span<const std::uint32_t> some);
 
 PointHierarchy place_points(const Tracer&, const GatherFaces&, const PointPlacement&, Threads&);
 

@@ -5,20 +5,18 @@
 
 #include "core/base/expects.h"
 #include "core/base/random.h"
+#include "core/meshless/adaptive_points.h"
 #include "core/meshless/anderson.h"
 #include "core/meshless/cover.h"
-#include "core/meshless/demand.h"
 #include "core/meshless/gather_rows.h"
-#include "core/meshless/point_grid.h"
-#include "core/meshless/reading.h"
-#include "core/prt/morton.h"
+#include "core/meshless/paper_bounces.h"
+#include "core/meshless/surface_reading.h"
 #include "core/prt/ray_origin.h"
 
 namespace kiln {
 namespace {
 
 constexpr std::size_t kBlock = 128;
-constexpr float kChildReach = 2;    // of the parent level's R: points that a flagged point sends for
 constexpr int kPlainSweeps = 4;     // from whose last two the factor is known by which light shrinks at a bounce
 constexpr double kFaintest = 0.01;  // at most this much of kTail may change in a sweep: some light shrinks slower
 constexpr double kRounding = 3e-7;  // of the light: sweeps change it no less
@@ -39,9 +37,10 @@ class Solver {
     for (const StandIn& s : params.stand_ins) vertices_[s.vertex] = s.point;
     vertices_.insert(vertices_.end(), params.places.begin(), params.places.end());
     begin_stage("points");
-    out_.surface = std::make_unique<LitSurface>(tracer, sky, LitSurface::Points{params.points, vertices_}, threads);
+    PointPlacement placement = params.points;
+    if (params.paper) placement.both_sides = kMaxPointLevels;  // a hit reads its own side, with no path to lead on
+    out_.surface = std::make_unique<LitSurface>(tracer, sky, LitSurface::Points{placement, vertices_}, threads);
     for (const MeshlessPoint& p : points().points) {
-      sites_.push_back(p.site);
       at_.push_back(transfer_point(p));
     }
     rows_.emplace(out_.surface->paths(), params.rays, params.seed);
@@ -51,9 +50,7 @@ class Solver {
     begin_stage("direct");
     find_direct();
     out_.indirect.resize(vertices_.size());
-    for (std::size_t level = 0; level < points().levels(); ++level) {
-      out_.stats.points.push_back(points().level_end[level] - points().begin(level));
-    }
+    out_.stats.points = level_sizes(points());
     out_.stats.gathered.resize(points().levels());
     if (params_.light_points) {
       out_.points = points();
@@ -64,6 +61,10 @@ class Solver {
       return std::move(out_);
     }
     direct_ = direct_at(at_, rough_light_);
+    if (params_.paper) {
+      solve_as_the_paper();
+      return std::move(out_);
+    }
     begin_stage("gather");
     gather_adaptively();
     begin_stage("basis");
@@ -95,141 +96,48 @@ class Solver {
   }
 
   /// Gathers at points and keeps what one bounce brings there.
-  void gather(std::vector<std::uint32_t> points) {
-    std::vector<TransferPoint> places;
-    std::vector<Vec3f> positions;
-    for (const std::uint32_t p : points) positions.push_back(sites_[p].position);
+  void gather(std::span<const std::uint32_t> points) {
     const std::size_t first = receiver_.size();
-    for (const std::uint32_t i : morton_order(positions)) {
-      receiver_.push_back(points[i]);
-      places.push_back(at_[points[i]]);
-    }
+    receiver_.insert(receiver_.end(), points.begin(), points.end());
+    std::vector<TransferPoint> places;
+    for (const std::uint32_t p : points) places.push_back(at_[p]);
     rows_->add(places, threads_, out_.stats.gather_rays);
     first_bounce_.resize(receiver_.size());
     threads_.for_blocks(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = first + begin; r < first + end; ++r) first_bounce_[r] = rows_->apply(r, direct_);
     });
-    for (const std::uint32_t p : points) ++out_.stats.gathered[level_of(p)];
-  }
-
-  std::size_t level_of(std::uint32_t point) const {
-    const std::vector<std::uint32_t>& ends = points().level_end;
-    return static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), point) - ends.begin());
-  }
-
-  /// For what places read of the receivers so far.
-  Reading read_receivers() const {
-    std::vector<SurfaceSite> some;
-    for (const std::uint32_t p : receiver_) some.push_back(sites_[p]);
-    return {tracer_, {some, points().cover, params_.neighbours}, threads_};
-  }
-
-  std::span<const TransferPoint> places_of(std::uint32_t begin, std::uint32_t end) const {
-    return std::span(at_).subspan(begin, end - begin);
+    double mean = 0;
+    for (std::size_t r = 0; r < receiver_.size(); ++r) mean += mean_of(first_bounce_[r] + direct_[receiver_[r]]);
+    limit_ = static_cast<float>(params_.eps * mean / static_cast<double>(std::max<std::size_t>(1, receiver_.size())));
   }
 
   /// COMPUTE-BOUNCE's refinement, for all bounces at once.
   void gather_adaptively() {
-    const auto uniform = static_cast<std::size_t>(params_.uniform_levels);
-    std::size_t before = 0;             // receivers of the levels above the last one
-    std::optional<Readings> predicted;  // of the last level's points, from those receivers
-    for (std::size_t level = 0; level < points().levels(); ++level) {
-      const std::uint32_t begin = points().begin(level), end = points().level_end[level];
-      const bool everywhere = level < uniform || level >= points().placed_levels();
-      std::vector<char> chosen(end - begin, everywhere ? 1 : 0);
-      std::optional<Readings> seen;
-      if (level + 1 >= uniform && level < points().placed_levels())
-        seen.emplace(read_receivers(), places_of(begin, end), threads_);
-      if (!everywhere) {
-        for (const std::uint32_t p : children_of(mispredicted(before, level - 1, *predicted), level))
-          chosen[p - begin] = 1;
-        for (std::size_t i = 0; i < chosen.size(); ++i) {
-          if (!seen->any(i) || sites_[begin + i].group == kCoveredGroup) chosen[i] = 1;
-        }
-      }
-      before = receiver_.size();
-      predicted = std::move(seen);
-      gather(marked(chosen, begin));
-    }
-  }
-
-  static std::vector<std::uint32_t> marked(const std::vector<char>& marks, std::uint32_t first) {
-    std::vector<std::uint32_t> out;
-    for (std::uint32_t i = 0; i < marks.size(); ++i) {
-      if (marks[i] != 0) out.push_back(first + i);
-    }
-    return out;
-  }
-
-  /// RECEIVER-ORACLE: points gathered last, of `level`, that those before them do not predict.
-  std::vector<std::uint32_t> mispredicted(std::size_t before, std::size_t level, const Readings& predicted) const {
-    double mean = 0;
-    for (std::size_t r = 0; r < receiver_.size(); ++r) mean += mean_of(first_bounce_[r] + direct_[receiver_[r]]);
-    const auto limit =
-        static_cast<float>(params_.eps * mean / static_cast<double>(std::max<std::size_t>(1, receiver_.size())));
-    std::vector<std::uint32_t> out;
-    for (std::size_t r = before; r < receiver_.size(); ++r) {
-      const std::size_t i = receiver_[r] - points().begin(level);
-      if (level > 0 && !predicted.any(i)) continue;  // of a pocket: finer points there that see nothing gather anyway
-      if (largest(first_bounce_[r] - predicted.apply(i, first_bounce_)) > limit) out.push_back(receiver_[r]);
-    }
-    return out;
-  }
-
-  /// The points of a level around points of the level above.
-  std::vector<std::uint32_t> children_of(const std::vector<std::uint32_t>& parents, std::size_t level) const {
-    const float reach = kChildReach * points().radius[level - 1];
-    PointGrid grid(2 * reach);
-    for (const std::uint32_t p : parents) grid.add(p, sites_[p].position);
-    std::vector<std::uint32_t> out;
-    for (std::uint32_t p = points().begin(level); p < points().level_end[level]; ++p) {
-      bool near = false;
-      grid.near(sites_[p].position, reach, [&](std::uint32_t q, float d2) {
-        const float cosine = dot(sites_[p].normal, sites_[q].normal);
-        near = near || (sites_[p].group == sites_[q].group && cosine > 0 && d2 <= reach * reach * cosine * cosine);
-      });
-      if (near) out.push_back(p);
-    }
-    return out;
+    compute_adaptively({.tracer = tracer_,
+                        .points = points(),
+                        .uniform_levels = params_.uniform_levels,
+                        .neighbours = params_.neighbours,
+                        .compute = [this](std::span<const std::uint32_t> some) { gather(some); },
+                        .wrong =
+                            [this](std::size_t r, std::span<const BasisTerm> terms) {
+                              return largest(first_bounce_[r] - sum_of(terms, first_bounce_)) > limit_;
+                            }},
+                       threads_);
   }
 
   /// How points and vertices get reflected light from the receivers. Points that see none gather for themselves, and
   /// so do vertices that see no point at all.
   void prepare_reading() {
-    const auto all = static_cast<std::uint32_t>(sites_.size());
-    for (int round = 0; round < 2; ++round) {
-      const Reading reading = read_receivers();
-      at_points_.emplace(reading, places_of(0, all), threads_);
-      at_vertices_.emplace(reading, vertices_, threads_);
-      if (gather_unseen() == 0) break;
-    }
-    receiver_of_.assign(all, kNoReceiver);
-    for (std::uint32_t r = 0; r < receiver_.size(); ++r) receiver_of_[receiver_[r]] = r;
-
-    nearest_.assign(vertices_.size(), Senders::kNone);
-    for_each(vertices_.size(), [&](std::size_t v) {
-      if (at_vertices_->any(v)) return;
-      nearest_[v] = out_.surface->paths().world().senders.nearest(reader_site(tracer_, vertices_[v], points().cover));
-    });
+    const SurfaceReading::Surface surface{tracer_, points(), out_.surface->paths().world().senders, vertices_};
+    reading_ = SurfaceReading::of_all(
+        surface, receiver_, params_.neighbours, [this](std::span<const std::uint32_t> some) { gather(some); },
+        threads_);
     std::vector<TransferPoint> own;
-    for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
-      if (at_vertices_->any(v) || nearest_[v] != Senders::kNone) continue;
-      alone_.push_back(v);
-      own.push_back(vertices_[v]);
-    }
+    for (const std::uint32_t v : reading_->alone()) own.push_back(vertices_[v]);
     first_alone_ = rows_->size();
     rows_->add(own, threads_, out_.stats.gather_rays);
-    out_.stats.alone = alone_.size();
-  }
-
-  /// Points that neither gather nor see one that does.
-  std::size_t gather_unseen() {
-    std::vector<char> unseen(sites_.size());
-    for (std::size_t p = 0; p < unseen.size(); ++p) unseen[p] = at_points_->any(p) ? 0 : 1;
-    for (const std::uint32_t p : receiver_) unseen[p] = 0;
-    const std::vector<std::uint32_t> found = marked(unseen, 0);
-    if (!found.empty()) gather(found);
-    return found.size();
+    out_.stats.alone = own.size();
+    out_.stats.gathered = count_by_level(points(), receiver_);
   }
 
   /// The Neumann series i_{k+1} = c + T (e + i_k), mixed after its first terms, and the reading of its limit.
@@ -263,13 +171,62 @@ class Solver {
       if (done) break;
     }
     if (automatic) spread(gathered, total);
-    for_each(out_.point_light.size(), [&](std::size_t p) {
-      const std::uint32_t r = receiver_of_[p];
-      out_.point_light[p] += r != kNoReceiver ? gathered[r] : at_points_->apply(p, gathered);
-    });
+    for_each(out_.point_light.size(),
+             [&](std::size_t p) { out_.point_light[p] += sum_of(reading_->of_point(p), gathered); });
     read_vertices(gathered, total);
-    probe(total);
+    probe(total, [this](std::uint32_t v) { return spread_of(v); });
     out_.surface->set_light(std::move(total));
+  }
+
+  /// The paper's scheme, on all points but those that were asked for.
+  void solve_as_the_paper() {
+    begin_stage("basis");
+    const std::vector<std::uint32_t> ends(points().level_end.begin(),
+                                          points().level_end.begin() + points().placed_levels());
+    const std::size_t placed = ends.empty() ? 0 : ends.back();
+    const auto site_of = [this](const TransferPoint& p) {
+      return SurfaceSite{p.position, p.normal, group_of(tracer_, p, points().cover)};
+    };
+    std::vector<SurfaceSite> sites;
+    for (std::size_t p = 0; p < placed; ++p) sites.push_back(points().points[p].site);
+    const MeshlessBasis basis(sites, ends, threads_, params_.neighbours);
+    begin_stage("bounces");
+    const SenderPaths::World& world = out_.surface->paths().world();
+    const PaperLight light =
+        bounce_on_basis({tracer_, world.faces, world.albedo, points().cover}, basis, std::span(at_).first(placed),
+                        std::span(direct_).first(placed),
+                        {params_.rays, params_.eps, *params_.paper, params_.bounces, params_.seed}, threads_);
+    out_.stats.gather_rays += light.rays;
+    out_.stats.sweeps = light.bounces;
+    out_.stats.tail = light.tail;
+    for (std::uint32_t p = 0; p < placed; ++p) {
+      if (light.gathered[p] != 0) receiver_.push_back(p);
+    }
+    out_.stats.gathered = count_by_level(points(), receiver_);
+    begin_stage("reading");
+    const auto reflected = [&](const TransferPoint& p) {
+      const Vec3f x = basis.evaluate(light.coefficients, site_of(p), basis.levels());
+      return Vec3f{std::max(0.0F, x.x), std::max(0.0F, x.y), std::max(0.0F, x.z)};
+    };
+    for_each(vertices_.size(), [&](std::size_t v) { out_.indirect[v] = reflected(vertices_[v]); });
+    std::vector<Vec3f> total = direct_;
+    for_each(total.size(), [&](std::size_t p) { total[p] += reflected(at_[p]); });
+    for_each(out_.point_light.size(), [&](std::size_t p) { out_.point_light[p] += total[p] - direct_[p]; });
+    probe(total, [&](std::uint32_t v) { return spread_of(basis, light.gathered, site_of(vertices_[v])); });
+    out_.surface->set_light(std::move(total));
+  }
+
+  /// Of a value of the finest level that was gathered everywhere around: what coarser ones add cancels.
+  static float spread_of(const MeshlessBasis& basis, const std::vector<char>& gathered, const SurfaceSite& site) {
+    std::vector<BasisTerm> terms;
+    for (std::size_t level = basis.levels(); level-- > 0;) {
+      terms.clear();
+      float sum = 0;
+      basis.terms_of(level, site, terms);
+      for (const BasisTerm& t : terms) sum += gathered[t.function] != 0 ? t.value * t.value : 2;
+      if (sum > 0 && sum <= 1) return sum;
+    }
+    return 1;
   }
 
   /// Share of the light in a geometric series whose last two terms are known.
@@ -280,7 +237,7 @@ class Solver {
   }
 
   /// What some vertices would gather for themselves, twice, beside what they read.
-  void probe(const std::vector<Vec3f>& total) {
+  void probe(const std::vector<Vec3f>& total, const std::function<float(std::uint32_t vertex)>& spread) {
     std::vector<TransferPoint> at;
     for (const std::uint32_t v : params_.probes) at.push_back(vertices_[v]);
     out_.probes.resize(at.size());
@@ -292,14 +249,14 @@ class Solver {
     }
     for (std::size_t i = 0; i < at.size(); ++i) {
       out_.probes[i].read = out_.indirect[params_.probes[i]];
-      out_.probes[i].spread = spread_of(params_.probes[i]);
+      out_.probes[i].spread = spread(params_.probes[i]);
     }
   }
 
   float spread_of(std::uint32_t vertex) const {
-    if (nearest_[vertex] != Senders::kNone || !at_vertices_->any(vertex)) return 1;
+    if (reading_->of_vertex(vertex).empty()) return 1;
     float sum = 0;
-    for (const BasisTerm& t : at_vertices_->terms(vertex)) sum += t.value * t.value;
+    for (const BasisTerm& t : reading_->of_vertex(vertex)) sum += t.value * t.value;
     return sum;
   }
 
@@ -312,25 +269,15 @@ class Solver {
     });
     for_each(vertices_.size(), [&](std::size_t v) {
       const Vec3f& normal = vertices_[v].normal;
-      const auto read = [&](std::span<const BasisTerm> terms) {
-        for (const BasisTerm& t : terms) out_.indirect[v] += turned[t.function].at(normal) * t.value;
-      };
-      const std::uint32_t nearest = nearest_[v];
-      if (nearest == Senders::kNone) {
-        read(at_vertices_->terms(v));
-      } else if (receiver_of_[nearest] != kNoReceiver) {
-        out_.indirect[v] = turned[receiver_of_[nearest]].at(normal);
-      } else {
-        read(at_points_->terms(nearest));
-      }
+      for (const BasisTerm& t : reading_->of_vertex(v)) out_.indirect[v] += turned[t.function].at(normal) * t.value;
     });
-    for_each(alone_.size(), [&](std::size_t i) { out_.indirect[alone_[i]] = rows_->apply(first_alone_ + i, total); });
+    const std::vector<std::uint32_t>& alone = reading_->alone();
+    for_each(alone.size(), [&](std::size_t i) { out_.indirect[alone[i]] = rows_->apply(first_alone_ + i, total); });
   }
 
   /// Direct and reflected light at all points.
   void spread(const std::vector<Vec3f>& gathered, std::vector<Vec3f>& total) {
-    for_each(total.size(), [&](std::size_t s) { total[s] = direct_[s] + at_points_->apply(s, gathered); });
-    for_each(receiver_.size(), [&](std::size_t r) { total[receiver_[r]] = direct_[receiver_[r]] + gathered[r]; });
+    for_each(total.size(), [&](std::size_t s) { total[s] = direct_[s] + sum_of(reading_->of_point(s), gathered); });
   }
 
   template <class F>
@@ -345,18 +292,14 @@ class Solver {
   Threads& threads_;
   DirectLight light_, rough_light_;      // at vertices, at points
   std::vector<TransferPoint> vertices_;  // and the other places
-  std::vector<SurfaceSite> sites_;       // of the points
-  std::vector<TransferPoint> at_;
-  std::optional<GatherRows> rows_;       // of the receivers, then of `alone_`
+  std::vector<TransferPoint> at_;        // the points
+  std::optional<GatherRows> rows_;       // of the receivers, then of vertices that are alone
   std::vector<Vec3f> direct_;            // at the points
   std::vector<std::uint32_t> receiver_;  // the point of each row
   std::vector<Vec3f> first_bounce_;      // at the receivers
-  std::optional<Readings> at_points_, at_vertices_;
-  static constexpr std::uint32_t kNoReceiver = 0xffffffffU;
-  std::vector<std::uint32_t> receiver_of_;  // of each point
-  std::vector<std::uint32_t> nearest_;      // the point that a vertex reads which sees no receiver, or Senders::kNone
-  std::vector<std::uint32_t> alone_;        // vertices with rows of their own
-  std::size_t first_alone_ = 0;             // of the rows
+  float limit_ = 0;                      // of a prediction's error
+  std::optional<SurfaceReading> reading_;
+  std::size_t first_alone_ = 0;  // of the rows
   RadiosityResult out_;
 };
 

@@ -12,6 +12,9 @@
 //    one level of the Shepard basis (basis.h), radii by k nearest neighbours of whatever density is there. What a
 //    vertex reads is first turned to its normal (vector irradiance, VectorValue of gather_rows.h);
 //  - vertices inside solids, and those that no function reaches, have rows of their own.
+// `paper`: reflected light is solved by the scheme of the paper itself (paper_bounces.h) on the points that were
+// placed,
+//   and read as the basis has it at each vertex; direct light is found at vertices all the same, as the paper advises.
 // Bounces until what is left is below kTail of the light, by mixed sweeps (anderson.h); or as many as asked for.
 // Units   W m^-2 sr^-1 (value = irradiance / pi: what a white vertex radiates)
 // Cost    see README.md.   Memory  12 bytes a gathering ray, about 200 a point and 100 a vertex or place
@@ -20,6 +23,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -36,12 +40,13 @@ namespace kiln {
 struct Radiosity {
   PointPlacement points;
   DirectRays direct;
-  int rays = 512;          // of a gather
-  int uniform_levels = 3;  // gathered everywhere; at least 1
-  float eps = 0.02F;       // of the mean light: prediction error above which finer points are gathered
-  int bounces = -1;        // reflections; -1: until the tail is below kTail
-  int neighbours = 10;     // of the flattened points around a vertex
-  bool vector = true;      // reflected light is turned to the normal where it is read; else it is read as it is
+  int rays = 512;                   // of a gather
+  int uniform_levels = 3;           // gathered everywhere; at least 1
+  float eps = 0.02F;                // of the mean light: prediction error above which finer points are gathered
+  int bounces = -1;                 // reflections; -1: until the tail is below kTail
+  int neighbours = 10;              // of the flattened points around a vertex
+  std::optional<float> paper = {};  // the paper's own scheme (paper_bounces.h), and its eps_solid_angle, sr
+  bool vector = true;  // reflected light is turned to the normal where it is read; else it is read as it is
   std::uint64_t seed = 0;
   std::vector<Vec3f> known_direct = {};    // direct light of each vertex; empty: it is found
   std::vector<StandIn> stand_ins = {};     // where hidden vertices are lit instead; ascending (core/prt/hidden.h)

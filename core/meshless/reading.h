@@ -39,6 +39,12 @@ class Reading {
   MeshlessBasis basis_;
 };
 
+inline Vec3f sum_of(std::span<const BasisTerm> terms, std::span<const Vec3f> values) {
+  Vec3f sum;
+  for (const BasisTerm& t : terms) sum += values[t.function] * t.value;
+  return sum;
+}
+
 /// What many places read, as rows of a sparse matrix whose weights add up to 1.
 class Readings {
  public:
@@ -48,11 +54,6 @@ class Readings {
   bool any(std::size_t place) const { return begin_[place + 1] > begin_[place]; }
   std::span<const BasisTerm> terms(std::size_t place) const {
     return std::span(terms_).subspan(begin_[place], begin_[place + 1] - begin_[place]);
-  }
-  Vec3f apply(std::size_t place, std::span<const Vec3f> values) const {
-    Vec3f sum;
-    for (const BasisTerm& t : terms(place)) sum += values[t.function] * t.value;
-    return sum;
   }
 
  private:

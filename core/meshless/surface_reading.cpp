@@ -32,16 +32,36 @@ SurfaceReading::SurfaceReading(const Surface& surface, const Reading& reading, s
       at_vertices_(reading, surface.vertices, threads),
       self_(surface.points.points.size()),
       nearest_(surface.vertices.size(), Senders::kNone) {
-  for (std::uint32_t n = 0; n < computed.size(); ++n) self_[computed[n]] = {n, 1};
   threads.for_blocks(nearest_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       if (at_vertices_.any(v)) continue;
       nearest_[v] = surface.senders.nearest(reader_site(surface.tracer, surface.vertices[v], surface.points.cover));
     }
   });
+  let_read_themselves(computed);
+}
+
+void SurfaceReading::let_read_themselves(std::span<const std::uint32_t> computed) {
+  for (std::uint32_t n = 0; n < computed.size(); ++n) self_[computed[n]] = {n, 1};
+  alone_.clear();
   for (std::uint32_t v = 0; v < nearest_.size(); ++v) {
     if (of_vertex(v).empty()) alone_.push_back(v);
   }
+}
+
+SurfaceReading SurfaceReading::of_all(const Surface& surface, const std::vector<std::uint32_t>& computed,
+                                      int neighbours, const Compute& compute, Threads& threads) {
+  SurfaceReading first(surface, computed, neighbours, threads);
+  const std::vector<std::uint32_t> unseen = first.unseen();
+  if (unseen.empty()) return first;
+  compute(along_curve(surface.points, unseen));
+  SurfaceReading second(surface, computed, neighbours, threads);
+  // Where points are denser they are read less far: a few more may see nothing now.
+  if (const std::vector<std::uint32_t> left = second.unseen(); !left.empty()) {
+    compute(along_curve(surface.points, left));
+    second.let_read_themselves(computed);
+  }
+  return second;
 }
 
 std::span<const BasisTerm> SurfaceReading::of_point(std::size_t point) const {

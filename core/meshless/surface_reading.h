@@ -6,6 +6,7 @@
 // Repeat   same bits for any thread count
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -27,16 +28,22 @@ class SurfaceReading {
   /// `computed` holds points, in the order of what is read.
   SurfaceReading(const Surface&, std::span<const std::uint32_t> computed, int neighbours, Threads&);
 
+  /// So that every point reads something: those that see nothing are computed too, and all is read anew, once.
+  /// `compute` is given them along the Morton curve, and appends them to `computed`.
+  using Compute = std::function<void(std::span<const std::uint32_t> points)>;
+  static SurfaceReading of_all(const Surface&, const std::vector<std::uint32_t>& computed, int neighbours,
+                               const Compute& compute, Threads&);
+
   /// Indices into `computed`, and weights that add up to 1; empty where nothing is seen.
   std::span<const BasisTerm> of_point(std::size_t point) const;
   std::span<const BasisTerm> of_vertex(std::size_t vertex) const;
 
-  /// Points that read nothing.
-  std::vector<std::uint32_t> unseen() const;
   const std::vector<std::uint32_t>& alone() const { return alone_; }  // vertices, ascending
 
  private:
   SurfaceReading(const Surface&, const Reading&, std::span<const std::uint32_t> computed, Threads&);
+  void let_read_themselves(std::span<const std::uint32_t> computed);
+  std::vector<std::uint32_t> unseen() const;  // points that read nothing
 
   Readings at_points_, at_vertices_;
   std::vector<BasisTerm> self_;         // of each point: itself among the computed ones, or no weight

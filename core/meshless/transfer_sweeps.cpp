@@ -195,25 +195,15 @@ class Solver {
 
   void prepare_reading() {
     const SurfaceReading::Surface surface{tracer_, points(), surface_->paths().world().senders, vertices_};
-    reading_.emplace(surface, receiver_, params_.neighbours, threads_);
-    if (const std::vector<std::uint32_t> unseen = reading_->unseen(); !unseen.empty()) {
-      gather(unseen);
-      reading_.emplace(surface, receiver_, params_.neighbours, threads_);
-    }
+    reading_ = SurfaceReading::of_all(
+        surface, receiver_, params_.neighbours, [this](std::span<const std::uint32_t> some) { gather(some); },
+        threads_);
     std::vector<TransferPoint> own;
     for (const std::uint32_t v : reading_->alone()) own.push_back(vertices_[v]);
     rows_->add(own, threads_, out_.stats.gather_rays);
     out_.stats.alone = own.size();
-    count_levels();
-  }
-
-  void count_levels() {
-    const std::vector<std::uint32_t>& ends = points().level_end;
-    out_.stats.gathered.resize(ends.size());
-    for (std::size_t level = 0; level < ends.size(); ++level)
-      out_.stats.points.push_back(ends[level] - points().begin(level));
-    for (const std::uint32_t p : receiver_)
-      ++out_.stats.gathered[static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), p) - ends.begin())];
+    out_.stats.points = level_sizes(points());
+    out_.stats.gathered = count_by_level(points(), receiver_);
   }
 
   // --- the series

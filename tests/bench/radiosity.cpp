@@ -1,6 +1,7 @@
 // Radiosity at vertices: relRMSE against the shared references for processor seconds. One JSON line a run: the
-// meshless rows, core/prt's vertices (direct light of lamps, then its Neumann series), and the plain path estimator.
-//   kiln_radiosity [scene: cornell | bunny | all] [repeats] [method: rows | vertices | paths | all]
+// meshless rows, the paper's own scheme on the same points, core/prt's vertices (direct light of lamps, then its
+// Neumann series), and the plain path estimator.
+//   kiln_radiosity [scene: cornell | bunny | all] [repeats] [method: rows | paper | vertices | paths | all]
 
 #include "core/meshless/radiosity.h"
 
@@ -9,6 +10,7 @@
 #include <map>
 #include <string>
 
+#include "core/meshless/paper_bounces.h"
 #include "core/prt/interreflection.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sh.h"
@@ -67,7 +69,7 @@ std::string list(const std::vector<std::uint32_t>& numbers) {
   return text + "]";
 }
 
-void run_rows(const Case& c, const std::string& knobs, const Radiosity& params, int repeats, Threads& threads) {
+void run_points(const Case& c, const std::string& knobs, const Radiosity& params, int repeats, Threads& threads) {
   std::vector<double> seconds;
   std::vector<Vec3f> values;
   std::string more;
@@ -92,7 +94,7 @@ void run_rows(const Case& c, const std::string& knobs, const Radiosity& params, 
       more += text;
     }
   }
-  print(c, "rows", knobs, seconds, values, more);
+  print(c, params.paper ? "paper" : "rows", knobs, seconds, values, more);
 }
 
 void run_vertices(const Case& c, int lamp_samples, int bounce_samples, int repeats, Threads& threads) {
@@ -173,15 +175,21 @@ int main(int argc, char** argv) {
   const int repeats = argc > 2 ? std::max(1, std::atoi(argv[2])) : 1;
   Threads threads(2);
   for (const Case& c : load(scene)) {
+    const auto rows = [&](const std::string& knobs, const Radiosity& r) { run_points(c, knobs, r, repeats, threads); };
     if (method == "rows" || method == "all") {
       const LampRays few{16, 64}, many{64, 512};
-      const auto rows = [&](const std::string& knobs, const Radiosity& r) { run_rows(c, knobs, r, repeats, threads); };
       rows("draft", {.points = {.wanted = 4096}, .direct = {few, 64}, .rays = 128, .eps = 0.05F});
       rows("256 rays, eps .05", {.rays = 256, .eps = 0.05F});
       rows("default", {});
       rows("scalar", {.vector = false});
       rows("all gathered", {.uniform_levels = 5});
       rows("final", {.points = {.wanted = 60000}, .direct = {many, 1024}, .rays = 1024, .eps = 0.01F});
+    }
+    if (method == "paper" || method == "all") {
+      const float omega = kPaperSolidAngle;
+      rows("eps .05, 128 rays", {.points = {.levels = 4}, .rays = 128, .eps = 0.05F, .paper = omega});
+      rows("eps .04, 512 rays", {.points = {.levels = 4}, .eps = 0.04F, .paper = omega});
+      rows("eps .02, 512 rays", {.points = {.levels = 4}, .eps = 0.02F, .paper = omega});
     }
     if (method == "vertices" || method == "all") {
       run_vertices(c, 64, 64, repeats, threads);

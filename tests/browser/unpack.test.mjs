@@ -80,11 +80,14 @@ test('the two scenes share their numbers, and no accessor: each may be disposed 
   });
 });
 
-test('points of a bake stay out of the plain file, and are no links', () => {
-  const points = readFileSync(new URL('fixtures/points.glb', import.meta.url)); // kiln-make-sample --lightmap points.glb 1 1
+test('points of a bake stay out of the plain file, and are read', () => {
+  const points = readFileSync(new URL('fixtures/points.glb', import.meta.url)); // of fixtures/make_points.sh
   assert.equal(glbJson(points).json.extensions.KILN_meshless_light.version, 2);
-  const { file: plainly, links } = unpack(draco, bufferOf(points));
+  const { file: plainly, links, points: field } = unpack(draco, bufferOf(points));
   assert.equal(links, null);
+  assert.deepEqual(field.levelEnd, glbJson(points).json.extensions.KILN_meshless_light.levels);
+  assert.equal(field.sites.length, 4 * field.levelEnd.at(-1));
+  assert.equal(field.coefficients.length, 3 * field.levelEnd.at(-1));
   const { json } = glbJson(Buffer.from(plainly));
   assert.equal(json.extensions.KILN_meshless_light, undefined);
   assert.equal(json.extensions.KILN_lightmap.version, 1);

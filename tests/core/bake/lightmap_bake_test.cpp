@@ -199,6 +199,73 @@ TEST(LightmapBake, OfAPointLightInABlackRoomIsIntensityTimesCosineOverSquaredDis
   EXPECT_LT(image, 0.02);
 }
 
+/// A black floor from -1 to 1, of which a black sheet above keeps the sun that shines straight down where
+/// x < kSlant z; the floor is .1 to .9 of the picture.
+constexpr double kSlant = 0.4;
+Bytes half_shadowed_floor() {
+  test::Sample sample;
+  const auto square = [&](const std::vector<float>& corners, const std::string& more) {
+    const std::string p = std::to_string(sample.positions(corners)),
+                      n = std::to_string(sample.normals({0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0}));
+    return R"({"attributes":{"POSITION":)" + p + R"(,"NORMAL":)" + n + more + R"(},"material":0,"indices":)" +
+           std::to_string(sample.indices({0, 1, 2, 0, 2, 3})) + "}";
+  };
+  const std::vector<float> uv = {0.1F, 0.9F, 0.9F, 0.9F, 0.9F, 0.1F, 0.1F, 0.1F};
+  const std::string on = R"(,"TEXCOORD_1":)" + std::to_string(sample.accessor(uv, 5126, "VEC2", 4));
+  const float slant = 1.5F * static_cast<float>(kSlant);
+  const std::string floor = square({-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1}, on),
+                    sheet = square({-3, 0.5F, 1.5F, slant, 0.5F, 1.5F, -slant, 0.5F, -1.5F, -3, 0.5F, -1.5F}, "");
+  return sample.glb(
+      R"("meshes":[{"primitives":[)" + floor + "," + sheet +
+      R"(]}],"materials":[{"doubleSided":true,"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0}}],)"
+      R"("nodes":[{"mesh":0},{"rotation":[-0.70710678,0,0,0.70710678],"extensions":{"KHR_lights_punctual":{"light":0}}}],)"
+      R"("scenes":[{"nodes":[0,1]}],"scene":0,"extensionsUsed":["KHR_lights_punctual"],)"
+      R"("extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","intensity":3}]}})");
+}
+
+TEST(LightmapBake, OfAnEdgeOfShadowIsTheShareOfEachTexelThatIsLit) {
+  Threads threads;
+  const auto output = bake(
+      input_of(half_shadowed_floor(),
+               R"({"steps":[{"do":"radiosity","deliver":["lightmap"],"lightmap":{"size":40}}],"certificate":false})"),
+      {}, threads);
+  ASSERT_TRUE(output) << output.error().message;
+  const auto map = read_lightmap_exr(file(*output, "lightmap.exr"), "lightmap.exr");
+  ASSERT_TRUE(map && map->side == 40);
+  // 32 x 32 texels; the share is that of 64 x 64 places of each.
+  constexpr int kFirst = 4, kTexels = 32, kPlaces = 64;
+  const float full = map->texels[(kFirst + 16) * 40 + kFirst + 30].x;
+  ASSERT_GT(full, 0.1F);
+  int edge = 0;
+  for (int row = 0; row < kTexels; ++row) {
+    for (int column = 0; column < kTexels; ++column) {
+      double share = 0;
+      for (int k = 0; k < kPlaces * kPlaces; ++k) {
+        const double x = -1 + 2 * (column + (k % kPlaces + 0.5) / kPlaces) / kTexels,
+                     z = -1 + 2 * (row + (k / kPlaces + 0.5) / kPlaces) / kTexels;
+        share += x > kSlant * z ? 1.0 / (kPlaces * kPlaces) : 0;
+      }
+      const float texel = map->texels[static_cast<std::size_t>((row + kFirst) * 40 + column + kFirst)].x;
+      // Sixteen places of a texel, in rows of four: the edge passes one of each row by a quarter of a texel at most,
+      // and by half that in the mean. A texel that took its centre's light alone would be off by up to a half.
+      EXPECT_NEAR(texel / full, share, 0.13) << row << " " << column;
+      edge += share > 0.05 && share < 0.95 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(edge, 30);
+}
+
+TEST(LightmapBake, AfterReduceIsRefusedByItsOwnStep) {
+  Threads threads;
+  const auto refused = bake(
+      testing::input_of("room", R"({"steps":[{"do":"reduce","ratio":0.5},{"do":"radiosity","deliver":["lightmap"]}]})"),
+      {}, threads);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "no_lightmap_coordinates");
+  EXPECT_EQ(refused.error().where, "/steps/1/deliver");
+  EXPECT_NE(refused.error().message.find("/steps/1/deliver"), std::string::npos) << refused.error().message;
+}
+
 TEST(LightmapBake, ThreadCountChangesNotOneByte) {
   Threads one(1), three(3);
   const Bytes scene = glb_of(Room(on_each_other), {.material = kFurnace, .lamp = true});

@@ -10,6 +10,7 @@ import { type FieldTexels, fieldTexels, readLightField, storedField } from './li
 import type { FieldLamp, LampExtension } from './field_lamps';
 import { readSky, type SkyData, type SkyExtension } from './mirrored_sky';
 import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
+import { type PointField, type PointsExtension, readPoints } from './point_field';
 import {
   arrivingTransfers,
   componentRows,
@@ -34,6 +35,7 @@ export interface Unpacked {
   arriving: StoredTransfer[]; // of the matrices, if there are any
   baked: BakedPrimitive[]; // in the order of the file
   links: LightLinks | null; // for lamps that move
+  points: PointField | null; // the light of the bake on its points
   progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
   sky: SkyData | null; // that the light field keeps apart
   lamps: FieldLamp[]; // that it keeps apart too
@@ -112,7 +114,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   const arriving = glossy ? arrivingTransfers(glossy, bytesIn(glossy.components.bufferView).slice().buffer) : [];
   const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
   const baked = new Map<Primitive, BakedPrimitive>();
-  const links = takeLinks(json, bytesIn);
+  const { links, points } = takeMeshless(json, bytesIn);
   const field = takeField(json, bytesIn);
   const progressive = takeProgressive(json, bytesIn);
   const out = new Binary();
@@ -142,6 +144,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     arriving,
     baked: primitives.filter(isBaked).map((primitive) => baked.get(primitive)!),
     links,
+    points,
     progressive,
     sky: field?.sky ?? null,
     lamps: field?.apart.lamps?.lights ?? [],
@@ -150,14 +153,15 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
 
 const [kLinks, kField, kProgressive] = ['KILN_meshless_light', 'KILN_light_field', 'KILN_progressive_mesh'];
 
-const kPointsVersion = 2; // of KILN_meshless_light: the light of the bake on its points, which nothing here shows
+const kPointsVersion = 2; // of KILN_meshless_light: the light of the bake on its points
 
-/// The links stay out of the GLB: its buffer views are others.
-function takeLinks(json: Json, bytesIn: (view: number) => Uint8Array): LightLinks | null {
-  const extension = json.extensions?.[kLinks] as LinksExtension | undefined;
-  if (!extension) return null;
+/// Links or points stay out of the GLB: its buffer views are others.
+function takeMeshless(json: Json, bytesIn: (view: number) => Uint8Array): Pick<Unpacked, 'links' | 'points'> {
+  const extension = json.extensions?.[kLinks] as LinksExtension | PointsExtension | undefined;
+  if (!extension) return { links: null, points: null };
   const taken = takeExtension(json, kLinks, extension);
-  return taken.version === kPointsVersion ? null : readLinks(taken, bytesIn);
+  if (taken.version === kPointsVersion) return { links: null, points: readPoints(taken as PointsExtension, bytesIn) };
+  return { links: readLinks(taken as LinksExtension, bytesIn), points: null };
 }
 
 /// Light fields stay out of the GLB too.

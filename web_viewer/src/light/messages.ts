@@ -1,6 +1,7 @@
 // What the page and the light worker say to each other. Each request is answered by one reply with its `serial`. The worker
 // begins: its first message is a reply to no request.
 
+import type { PointField } from '../asset/point_field';
 import type { EquirectMap } from './equirect';
 import type { FieldTexels } from '../asset/light_field';
 import type { FieldLamp } from '../asset/field_lamps';
@@ -72,13 +73,15 @@ export interface ProjectReply {
 export type Reply = { serial: number } & (
   | { begun: true }
   // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
-  // numbers; the light field of each part, and the sky and lamps it keeps apart; the bytes of a progressive mesh
+  // numbers; the light field of each part, and the sky and lamps it keeps apart; the light on points; the bytes of a
+  // progressive mesh
   | {
       opened: ArrayBuffer;
       samples: Float32Array | null;
       field: FieldTexels[] | null;
       sky: SkyData | null;
       lamps: FieldLamp[];
+      points: PointField | null;
       progressive: Uint8Array<ArrayBuffer> | null;
     }
   | { values: ValuesReply }

@@ -2,6 +2,7 @@
 
 import type { FieldTexels } from '../asset/light_field';
 import type { FieldLamp } from '../asset/field_lamps';
+import type { PointField } from '../asset/point_field';
 import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
@@ -23,6 +24,8 @@ export class Relighter {
   /// What that keeps apart; null: nothing.
   sky: SkyData | null = null;
   lamps: FieldLamp[] = [];
+  /// Its light on points; null: it has none.
+  points: PointField | null = null;
   /// The bytes of its progressive mesh; null: it has none.
   progressive: Uint8Array<ArrayBuffer> | null = null;
 
@@ -40,7 +43,7 @@ export class Relighter {
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
     ({ samples: this.samples, field: this.field, progressive: this.progressive } = reply);
-    ({ sky: this.sky, lamps: this.lamps } = reply);
+    ({ sky: this.sky, lamps: this.lamps, points: this.points } = reply);
     return reply.opened;
   }
 

@@ -110,6 +110,7 @@ function furnish(page: Page, viewer: Viewer, job: Job, report: Report | null): v
     openGrid(page, viewer, job),
     openLightmap(page, viewer, job),
     openLamp(page, viewer, report),
+    openPoints(page, viewer),
     openProgressive(page, viewer),
   ]).then(() => (document.documentElement.dataset.ready = 'true'));
   Object.assign(window, { kilnViewer: viewer, kilnDispose: () => page.dispose() });
@@ -164,6 +165,19 @@ async function openLamp(page: Page, viewer: Viewer, report: Report | null): Prom
     await view.settled();
   } catch (error) {
     toast(`The lamp cannot be shown: ${(error as Error).message}`, 'error');
+  }
+}
+
+/// Light from the points that it was solved on, where the file has them.
+async function openPoints(page: Page, viewer: Viewer): Promise<void> {
+  if (!viewer.points) return;
+  try {
+    const { PointsView } = await import('./points_view');
+    const view = new PointsView(viewer, viewer.points);
+    page.onDispose(() => view.dispose());
+    Object.assign(window, { kilnPoints: view });
+  } catch (error) {
+    toast(`The points cannot be shown: ${(error as Error).message}`, 'error');
   }
 }
 

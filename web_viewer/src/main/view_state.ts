@@ -43,6 +43,9 @@ export interface ViewState {
   lampBaked: boolean; // the light of the bake is added
   lampIndirect: boolean; // reflected light alone
   lightmap: boolean; // shown in place of the light at the vertices, where there is one
+  points: boolean; // light from the points, splatted: see points_view.ts
+  pointLevels: number; // of them that are added up
+  dots: boolean; // points whose coefficients matter
   compare: number | null; // where the divider stands, 0 to 1; null: off
   pose: CameraPose | null; // null: the default view
 }
@@ -72,6 +75,9 @@ export const kDefaultState: ViewState = {
   lampBaked: false,
   lampIndirect: false,
   lightmap: true,
+  points: false,
+  pointLevels: 17,
+  dots: false,
   compare: null,
   pose: null,
 };
@@ -135,6 +141,9 @@ export function decodeState(text: string, lights: readonly string[]): ViewState 
     lampBaked: flag('lampBaked'),
     lampIndirect: flag('lampIndirect'),
     lightmap: flag('lightmap'),
+    points: flag('points'),
+    pointLevels: Math.round(number('pointLevels', 1, 17)),
+    dots: flag('dots'),
     compare: from.has('compare') ? number('compare', 0, 1) : null,
     pose: pose.length === 6 && pose.every(Number.isFinite) ? (pose as unknown as CameraPose) : null,
   };

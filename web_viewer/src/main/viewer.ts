@@ -1,6 +1,7 @@
 // The viewer without its panels: applies a ViewState to the stage. It keeps the state; panels and address listen to it.
 
 import type { LoadedAsset } from '../asset/parse_gltf';
+import type { PointField } from '../asset/point_field';
 import type { ValuesReply } from '../light/messages';
 import type { Relighter } from '../light/relighter';
 import { unshadowedLevel } from '../light/unshadowed';
@@ -27,6 +28,8 @@ export class Viewer {
   onLights: () => void = () => {};
   /// Told what is shown of a progressive mesh.
   onDetail: (text: string) => void = () => {};
+  /// Told which points are shown.
+  onDots: (text: string) => void = () => {};
   /// In place of the relighter's own question, while a lamp that moves is shown (lamp_view.ts).
   askLight: ((spare: Float32Array[]) => Promise<ValuesReply>) | null = null;
   private readonly background = new SkyBackground();
@@ -129,6 +132,11 @@ export class Viewer {
   /// Of a file with links: where lamps that move must be seen from.
   get lampSamples(): Float32Array | null {
     return this.finest.relighter.samples;
+  }
+
+  /// Of a file with the light of its points.
+  get points(): PointField | null {
+    return this.finest.relighter.points;
   }
 
   /// Of a file with a progressive mesh: its bytes.

@@ -3,6 +3,7 @@
 //   radiance = (1 - metallic) albedo (1 - 0.04 a - b) value + (F0 a + b) mirror + emission
 //   F0 = mix(0.04, albedo, metallic)
 // With a lightmap (LIGHTMAP: lightmap_view.ts) the value is its irradiance / pi, filtered at each pixel.
+// With light from points (POINTS: points_view.ts) the value is that of the pixel.
 // With a lamp that moves (LAMP: lamp_view.ts) its direct light is added to the value at each pixel:
 //   lampIntensity cos / (pi d^2), a share of shadow taps free
 //
@@ -109,6 +110,9 @@ uniform bool white;
 #ifdef LIGHTMAP
 uniform sampler2D lightmap;
 #endif
+#ifdef POINTS
+uniform highp sampler2D pointLight;
+#endif
 #ifdef ALBEDO_MAP
 uniform sampler2D albedoMap;
 #endif
@@ -170,7 +174,9 @@ void main() {
   emitted *= texture2D(emissionMap, vEmissionUv).rgb;
 #endif
   // Spherical harmonics ring: a point in deep shadow may come out a little below zero.
-#ifdef LIGHTMAP
+#ifdef POINTS
+  vec3 value = max(texelFetch(pointLight, ivec2(gl_FragCoord.xy), 0).rgb, vec3(0.0));
+#elif defined(LIGHTMAP)
   vec3 value = texture2D(lightmap, vLightmapUv).rgb / 3.14159265;
 #else
   vec3 value = max(vLight, vec3(0.0));
@@ -249,6 +255,7 @@ export function bakedMaterial({ unlit, glow, albedo, emission, vertexAlbedo, mir
       emission: { value: glow?.factor ?? new Color().setRGB(emission[0], emission[1], emission[2]) },
       white: { value: false },
       lightmap: { value: null },
+      pointLight: { value: null },
       albedoMap: { value: albedoMap },
       albedoMapTransform: { value: transformOf(albedoMap) },
       emissionMap: { value: emissionMap },
@@ -269,6 +276,14 @@ export function showLightmap(material: ShaderMaterial, texture: Texture | null):
   material.uniforms.lightmap.value = texture;
   if (texture) material.defines.LIGHTMAP = '';
   else delete material.defines.LIGHTMAP;
+  material.needsUpdate = true;
+}
+
+/// Puts light from points, a texel a pixel, in place of all other; null: takes it away. The texture is the caller's.
+export function showPointLight(material: ShaderMaterial, texture: Texture | null): void {
+  material.uniforms.pointLight.value = texture;
+  if (texture) material.defines.POINTS = '';
+  else delete material.defines.POINTS;
   material.needsUpdate = true;
 }
 

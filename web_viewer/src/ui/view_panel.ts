@@ -20,7 +20,9 @@ export interface Shown {
   readonly model: { transfer: Pick<StoredTransfer, 'order' | 'channels' | 'slots'> | null }; // null: a plain model
   readonly level?: { field: unknown }; // null: the model has no light field
   readonly progressive?: Uint8Array | null; // the file has a progressive mesh
+  readonly points?: { levelEnd: readonly number[] } | null; // the file has the light of its points
   onDetail?: (text: string) => void;
+  onDots?: (text: string) => void;
   onLights: () => void;
   useFile(file: File): Promise<void>;
 }
@@ -149,6 +151,7 @@ export class ViewPanel {
       ...(viewer.progressive ? this.detail() : []),
       controls.checkbox('wire', 'Wireframe'),
       ...(this.has.lightmap ? [controls.checkbox('lightmap', 'Light from the lightmap (off: from the vertices)')] : []),
+      ...(viewer.points ? this.points(viewer.points.levelEnd.length) : []),
       ...(this.has.grid ? this.grid() : []),
       compareSwitch(viewer, controls),
     ];
@@ -179,6 +182,19 @@ export class ViewPanel {
     return [controls.slider('detail', 'Progressive mesh', { min: 0, max: 1, step: 0.002, show }), play, text];
   }
 
+  private points(levels: number): HTMLElement[] {
+    const { controls, viewer } = this;
+    const text = h('p', { class: 'hint', id: 'dots-text' });
+    viewer.onDots = (what) => (text.textContent = what);
+    const show = (count: number) => (count >= levels ? 'all' : `${count}`);
+    return [
+      controls.checkbox('points', 'Light from the points, splatted (off: from the vertices)'),
+      controls.slider('pointLevels', 'Levels of points', { min: 1, max: levels, step: 1, show }),
+      controls.checkbox('dots', 'Points whose coefficients matter'),
+      text,
+    ];
+  }
+
   private grid(): HTMLElement[] {
     const { controls } = this;
     return [
@@ -191,6 +207,7 @@ export class ViewPanel {
   dispose(): void {
     this.viewer.onLights = () => {};
     this.viewer.onDetail = () => {};
+    this.viewer.onDots = () => {};
     this.controls.dispose();
     this.element.remove();
   }
