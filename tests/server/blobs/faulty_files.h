@@ -99,7 +99,7 @@ class FaultyFiles : public FileLayer {
   int close(int fd) override {
     if (dead_) return ::close(fd);      // the kernel does it for the dead
     if (calls == fail_at) ::close(fd);  // a close that fails has closed all the same (close(2))
-    if (calls == kill_at) {  // destructors close, and may not throw: the next call does
+    if (calls == kill_at) {             // destructors close, and may not throw: the next call does
       ++calls;
       dead_ = true;
       return FileLayer::close(fd);
@@ -162,7 +162,8 @@ class FaultyFiles : public FileLayer {
   }
 
  private:
-  /// A change of a folder that it may forget: a new name (`from` is empty), a rename, or a name taken away (both equal).
+  /// A change of a folder that it may forget: a new name (`from` is empty), a rename, or a name taken away (both
+  /// equal).
   struct Entry {
     std::string path, from;
     std::optional<std::string> before;  // the bytes that the name stood for
