@@ -96,12 +96,18 @@ void limit(pid_t pid, const WorkerStart& start) {
   const rlimit files{kMaxFiles, kMaxFiles};
   ::prlimit(pid, RLIMIT_CORE, &no_core, nullptr);
   ::prlimit(pid, RLIMIT_NOFILE, &files, nullptr);
+  if (start.cpu_s > 0) {
+    const auto seconds = static_cast<rlim_t>(start.cpu_s) + 1;
+    const rlimit processor{seconds, seconds + 5};  // SIGXCPU, and KILL for who passes over it
+    ::prlimit(pid, RLIMIT_CPU, &processor, nullptr);
+  }
   if (!kLimitAddressSpace || start.memory_bytes == 0) return;
   // Allocators and thread stacks reserve more than they use; resident memory is watched by the supervisor.
   // A scene is mapped, and what a reduction puts aside of it may be as large again.
   const rlim_t space = 2 * start.memory_bytes + 2 * start.mapped_bytes + (4ULL << 30);
   const rlimit address_space{space, space};
   ::prlimit(pid, RLIMIT_AS, &address_space, nullptr);
+  ::prlimit(pid, RLIMIT_FSIZE, &address_space, nullptr);  // nothing that it writes was not in its memory or its scene
 }
 
 }  // namespace

@@ -47,8 +47,11 @@ class FaultyFiles : public FileLayer {
   bool short_writes = false;
   std::string failed_call;
 
-  /// The next process on the same files.
+  ~FaultyFiles() override { restart(); }
+  /// The next process on the same files. The kernel closes what the dead one had open.
   void restart() {
+    for (const auto& [fd, path] : paths_) ::close(fd);
+    paths_.clear();
     dead_ = false;
     kill_at = fail_at = -1;
     failed_call.clear();
@@ -97,6 +100,7 @@ class FaultyFiles : public FileLayer {
     });
   }
   int close(int fd) override {
+    paths_.erase(fd);
     if (dead_) return ::close(fd);      // the kernel does it for the dead
     if (calls == fail_at) ::close(fd);  // a close that fails has closed all the same (close(2))
     if (calls == kill_at) {             // destructors close, and may not throw: the next call does
