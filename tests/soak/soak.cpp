@@ -4,7 +4,7 @@
 //   kiln_soak stale ROUNDS
 //   kiln_soak crowd sqlite|postgres CLIENTS SLOW UPLOADS
 //   kiln_soak steady SECONDS
-//   kiln_soak split MODEL.glb QUALITY SHARE_S
+//   kiln_soak split MODEL.glb|pit SAMPLES SHARE_S
 // Exit 0: every promise held; 1: a line says which did not, or why the run could not go on; 77: no PostgreSQL here.
 
 #include "tests/soak/soak.h"
@@ -22,7 +22,7 @@ namespace {
 int usage() {
   std::fputs(
       "kiln_soak kills sqlite|postgres CYCLES | stale ROUNDS | crowd sqlite|postgres CLIENTS SLOW UPLOADS |\n"
-      "          steady SECONDS | split MODEL.glb QUALITY SHARE_S\n",
+      "          steady SECONDS | split MODEL.glb|pit SAMPLES SHARE_S\n",
       stderr);
   return 2;
 }
@@ -60,7 +60,7 @@ int run(const std::vector<std::string>& words) {
   } else if (what == "steady" && words.size() == 2) {
     run_steady({count_of(words[1].c_str())}, breaches);
   } else if (what == "split" && words.size() == 4) {
-    run_split({words[1], words[2], std::atof(words[3].c_str())}, breaches);
+    run_split({words[1], count_of(words[2].c_str()), std::atof(words[3].c_str())}, breaches);
   } else {
     return usage();
   }

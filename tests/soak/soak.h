@@ -91,8 +91,8 @@ struct Steady {
 void run_steady(const Steady&, Breaches&);
 
 struct Split {
-  std::filesystem::path model;  // GLB
-  std::string quality = "draft";
+  std::string model;    // a GLB file; "pit": that of the tests
+  int samples = 65536;  // of a point
   double share_s = 10;  // --share-s of the servers; 10 is theirs
 };
 /// One bake of the model by a worker with four threads, and by four workers with one: the same bytes, and processor

@@ -36,8 +36,17 @@ double processor_s(Fleet& fleet) {
 }
 
 struct Asked {
-  std::string model, quality;
+  std::string model;
+  int samples = 0;
 };
+
+std::string read_model(const std::string& model) {
+  if (model == "pit") return pit_glb(16);
+  std::ifstream file(model, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
 
 BakeOnce bake_over(int nodes, const Asked& asked, double share_s, Breaches& breaches) {
   Fleet fleet(true, nodes, {"--workers", "1", "--share-s", std::to_string(share_s)});
@@ -45,11 +54,15 @@ BakeOnce bake_over(int nodes, const Asked& asked, double share_s, Breaches& brea
   const std::string scene = sha256_of(asked.model);
   const int stored = http_put(port, "/v1/assets/" + scene, asked.model).status;
   breaches.expect(stored == 201, "the model was answered with " + std::to_string(stored));
-  const json document = {{"scene", {{"asset", scene}}},
-                         {"environment", {{"builtin", "clear"}}},
-                         {"steps", {{{"do", "prt"}, {"order", 6}}}},
-                         {"quality", asked.quality},
-                         {"limits", {{"threads", kThreads / nodes}}}};
+  json document = json::parse(cube_job(scene, 1));
+  document["environment"] = {{"builtin", "clear"}};
+  document["steps"] = {{{"do", "prt"},
+                        {"order", 6},
+                        {"samples", asked.samples},
+                        {"bounces", 1},
+                        {"subdivide", "off"},
+                        {"merge", "off"}}};
+  document["limits"]["threads"] = kThreads / nodes;
   BakeOnce bake;
   const auto begin = Clock::now();
   const double before = processor_s(fleet);
@@ -57,8 +70,10 @@ BakeOnce bake_over(int nodes, const Asked& asked, double share_s, Breaches& brea
   if (answer.status != 202) throw std::runtime_error("the job was answered with " + answer.body);
   const std::string id = json::parse(answer.body).at("id");
   json job = ask_job(port, id);
-  for (; job["status"] == "queued" || job["status"] == "running"; job = ask_job(port, id))
+  while (job["status"] != "succeeded" && job["status"] != "failed") {
     std::this_thread::sleep_for(500ms);
+    job = ask_job(port, id);
+  }
   bake.wall_s = seconds_since(begin);
   std::this_thread::sleep_for(2s);  // until the last workers are reaped
   bake.processor_s = processor_s(fleet) - before;
@@ -72,11 +87,9 @@ BakeOnce bake_over(int nodes, const Asked& asked, double share_s, Breaches& brea
 }  // namespace
 
 void run_split(const Split& split, Breaches& breaches) {
-  std::ifstream file(split.model, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
-  const BakeOnce whole = bake_over(1, {text.str(), split.quality}, 0, breaches);
-  const BakeOnce parts = bake_over(kThreads, {text.str(), split.quality}, split.share_s, breaches);
+  const Asked asked{read_model(split.model), split.samples};
+  const BakeOnce whole = bake_over(1, asked, 0, breaches);
+  const BakeOnce parts = bake_over(kThreads, asked, split.share_s, breaches);
   const double ratio = parts.processor_s / whole.processor_s;
   breaches.expect(parts.scene_sha256 == whole.scene_sha256, "the bytes of a split bake are others");
   breaches.expect(parts.ranges_of_others > 0, "nothing was given away");
