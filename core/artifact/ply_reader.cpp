@@ -51,8 +51,9 @@ bool read_element(std::istringstream& words, PlyHeader& header) {
   std::string count;
   words >> element.name >> count;
   const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), element.count);
+  const bool again = std::ranges::find(header.elements, element.name, &PlyElement::name) != header.elements.end();
   header.elements.push_back(std::move(element));
-  return error == std::errc() && end == count.data() + count.size();
+  return !again && error == std::errc() && end == count.data() + count.size();
 }
 
 bool read_property(std::istringstream& words, PlyHeader& header) {
@@ -135,7 +136,8 @@ PlyHeader read_ply_header(Span file, Findings& findings) {
       return header;
     }
     if (!read_line(line, header)) {
-      findings.fail("ply_invalid", "The header line is not understood.", "line " + std::to_string(line_number));
+      findings.fail("ply_invalid", "The header line is not understood, or names an element again.",
+                    "line " + std::to_string(line_number));
       return header;
     }
   }

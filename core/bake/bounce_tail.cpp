@@ -18,13 +18,19 @@ constexpr int kSamples = 64;
 constexpr std::uint64_t kSeed = 0x626f756e6365;
 constexpr double kDark = 0.01;  // of an open point's light
 
-std::vector<ReferencePoint> probe_points(const Scene& scene) {
-  std::vector<ReferencePoint> points;
-  for (const SurfaceSample& s : sample_surface(scene.mesh, kPoints, kSeed)) {
-    const SurfacePoint p = surface_point(scene, s.triangle, s.u, s.v);
-    points.push_back({p.position, p.normal, p.geometric_normal});
-  }
+std::vector<SurfacePoint> probe_points(const Scene& scene) {
+  std::vector<SurfacePoint> points;
+  for (const SurfaceSample& s : sample_surface(scene.mesh, kPoints, kSeed))
+    points.push_back(surface_point(scene, s.triangle, s.u, s.v));
   return points;
+}
+
+double white_share(const Scene& scene, const std::vector<SurfacePoint>& points) {
+  const auto white = std::ranges::count_if(points, [&](const SurfacePoint& p) {
+    const Vec3f albedo = albedo_at(scene, p);
+    return std::min({albedo.x, albedo.y, albedo.z}) > kWhite;
+  });
+  return static_cast<double>(white) / static_cast<double>(points.size());
 }
 
 /// Mean light of each lighting when paths may reflect `bounces` times. The same seed walks the same paths, so the
@@ -58,14 +64,17 @@ double left_out(const std::vector<double>& some, const std::vector<double>& all)
 }  // namespace
 
 BounceTail measure_bounces(const Tracer& tracer, bool lamps, double tail, Threads& threads) {
-  const std::vector<ReferencePoint> points = probe_points(tracer.scene());
-  if (points.empty()) return {};
+  const std::vector<SurfacePoint> probes = probe_points(tracer.scene());
+  if (probes.empty()) return {};
+  const double white = white_share(tracer.scene(), probes);
+  std::vector<ReferencePoint> points;
+  for (const SurfacePoint& p : probes) points.push_back({p.position, p.normal, p.geometric_normal});
   const std::vector<double> all = mean_light(tracer, points, lamps, kSteps.back(), threads);
   for (const int bounces : kSteps) {
     const double left = left_out(mean_light(tracer, points, lamps, bounces, threads), all);
-    if (left <= tail) return {bounces, left};
+    if (left <= tail) return {bounces, left, white};
   }
-  return {kSteps.back(), 0};
+  return {kSteps.back(), 0, white};
 }
 
 }  // namespace kiln

@@ -6,9 +6,12 @@
 
 namespace kiln {
 
+inline constexpr float kWhite = 0.95F;  // paper and paint are at most .9
+
 struct BounceTail {
-  int bounces = 0;  // the fewest after which the rest stays within the tail
-  double left = 0;  // of the light, beyond those (against kLongest reflections), in the worst lighting
+  int bounces = 0;   // the fewest after which the rest stays within the tail
+  double left = 0;   // of the light, beyond those (against kLongest reflections), in the worst lighting
+  double white = 0;  // share of the surface that reflects more than kWhite of the light
 };
 
 /// `tail` is the share of the light that may be left out, under a constant sky and, with `lamps`, under the scene's own

@@ -26,6 +26,17 @@ void plan_order(Plan& plan, const PrtStep& step, const Effort& effort) {
          step.order ? kAsked : effort.reason + " keeps " + std::to_string(plan.order) + " bands of distant light");
 }
 
+/// What authors may mend: colours left at white.
+std::string why_so_many(const BounceTail& tail) {
+  constexpr int kMany = 16;
+  constexpr double kSome = 0.1;
+  if (tail.bounces < kMany || tail.white < kSome) return {};
+  return "; " + short_text(100 * tail.white) +
+         " % of the surface is whiter than any paint (base colour above 0.95): light in its pockets takes hundreds, "
+         "and "
+         "there the bake errs most";
+}
+
 void plan_bounces(Plan& plan, const Tracer& tracer, const PrtStep& step, const Effort& effort, Threads& threads) {
   if (step.bounces) {
     plan.bounces = *step.bounces;
@@ -36,9 +47,9 @@ void plan_bounces(Plan& plan, const Tracer& tracer, const PrtStep& step, const E
   plan.bounces = tail.bounces;
   plan.tail_left = tail.left;
   decide(plan, "bounces", std::to_string(plan.bounces),
-         plan.bounces == 0 && tail.left == 0
-             ? "no path finds light by reflection"
-             : "sample paths bring " + short_text(100 * tail.left) + " % of the light in later reflections");
+         plan.bounces == 0 && tail.left == 0 ? "no path finds light by reflection"
+                                             : "sample paths bring " + short_text(100 * tail.left) +
+                                                   " % of the light in later reflections" + why_so_many(tail));
 }
 
 void plan_samples(Plan& plan, const PrtStep& step, const Effort& effort) {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "core/base/expects.h"
-#include "core/lightfield/collapse_queue.h"
 #include "core/lightfield/collapse_reach.h"
+#include "core/mesh/collapse_queue.h"
 
 namespace kiln {
 namespace {

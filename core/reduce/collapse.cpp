@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/mesh/collapse_queue.h"
+
 namespace kiln {
 namespace {
 
@@ -10,48 +12,6 @@ constexpr std::uint32_t kNone = 0xffffffffU;
 constexpr double kTurned = 0.2;     // cosine between a triangle's normals before and after
 constexpr double kNeedle = 0.05;    // 4 sqrt(3) area / sum of squared edges: 1 for an equilateral triangle
 constexpr double kEvenness = 1e-6;  // of squared edge length beside the error: flat regions collapse short edges first
-
-struct Candidate {
-  float cost;
-  std::uint32_t a, b;  // a < b
-  std::uint32_t age;   // of both vertices together when the cost was found: ages only grow
-  bool operator<(const Candidate& o) const {
-    if (cost != o.cost) return cost < o.cost;
-    return a != o.a ? a < o.a : b < o.b;
-  }
-};
-
-/// The least first. Four children share a cache line, which is where a large queue spends its time.
-class Queue {
- public:
-  bool empty() const { return items_.empty(); }
-  void push(const Candidate& c) {
-    std::size_t at = items_.size();
-    items_.push_back(c);
-    for (; at > 0 && c < items_[(at - 1) / 4]; at = (at - 1) / 4) items_[at] = items_[(at - 1) / 4];
-    items_[at] = c;
-  }
-  Candidate pop() {
-    const Candidate least = items_.front(), last = items_.back();
-    items_.pop_back();
-    if (items_.empty()) return least;
-    std::size_t at = 0;
-    for (std::size_t child = 1; child < items_.size(); child = 4 * at + 1) {
-      const std::size_t end = std::min(child + 4, items_.size());
-      for (std::size_t other = child + 1; other < end; ++other) {
-        if (items_[other] < items_[child]) child = other;
-      }
-      if (!(items_[child] < last)) break;
-      items_[at] = items_[child];
-      at = child;
-    }
-    items_[at] = last;
-    return least;
-  }
-
- private:
-  std::vector<Candidate> items_;
-};
 
 class Collapser {
  public:
@@ -290,7 +250,7 @@ class Collapser {
   std::uint32_t stamp_ = 0;
   std::vector<bool> gone_, border_;
   std::vector<bool> refused_;  // an edge of it may be taken once what is around has changed
-  Queue queue_;
+  CollapseQueue queue_;
 };
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/lightfield/collapse_mesh.h"
-#include "core/lightfield/collapse_queue.h"
 #include "core/lightfield/mean_radiance.h"
+#include "core/mesh/collapse_queue.h"
 #include "core/mesh/topology.h"
 #include "tests/bench/light_field_compare.h"
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 #include <fstream>
 
 #include "tests/conformance/shared_models.h"
@@ -70,9 +70,9 @@ TEST_P(HostileFile, IsAnsweredByItsFault) {
   const Broken& broken = GetParam();
   reset_peak_memory();
   const std::uint64_t before = peak_memory_bytes();
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   const auto scene = import_shared("hostile/" + std::string(broken.file));
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  EXPECT_LT(std::clock() - start, 5 * CLOCKS_PER_SEC);  // of the processor: the machine may be shared
   EXPECT_LT(peak_memory_bytes(), before + (200u << 20));
   ASSERT_EQ(scene.has_value(), broken.ugly);
   if (broken.ugly) {

@@ -85,6 +85,7 @@ TEST(ImportPly, BrokenFilesNameTheirPlace) {
       {"ply\nformat ascii 1.0\nelement vertex many\nend_header\n", "ply_invalid", "line 3"},
       {"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "ply_invalid", "line 3"},
       {"ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n", "ply_invalid", "line 4"},
+      {"ply\nformat ascii 1.0\n" + kVertexHeader + kVertexHeader, "ply_invalid", "line 7"},
       {"ply\nformat ascii 1.0\n", "ply_invalid", "header"},
       {"ply\nend_header\n", "ply_invalid", "header"},
       {"ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n1\n", "ply_truncated",

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -24,14 +24,14 @@ void expect_clean_text(const Fault& fault) {
   EXPECT_EQ(fault.where.rfind("scene.glb", 0), 0U) << fault.where;
 }
 
-/// Imports and checks the answer, its time and its memory.
+/// Imports and checks the answer, its memory, and its time (of the processor: the machine may be shared).
 void expect_fault(const Bytes& file, const std::string& code, const std::string& where = {},
                   const std::map<std::string, Bytes>& resources = {}) {
   reset_peak_memory();
   const std::uint64_t before = peak_memory_bytes();
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   const auto scene = import_bytes(file, resources);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  EXPECT_LT(std::clock() - start, 5 * CLOCKS_PER_SEC);
   EXPECT_LT(peak_memory_bytes(), before + (200u << 20));
   ASSERT_FALSE(scene) << "expected " << code;
   EXPECT_EQ(scene.error().code, code) << scene.error().message << " " << scene.error().where;

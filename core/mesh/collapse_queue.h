@@ -1,5 +1,5 @@
 #pragma once
-// Candidates by cost, the least first, ties by points: the same order always.
+// Edges that a simplification may collapse, by cost, the least first, ties by points: the same order always.
 
 #include <algorithm>
 #include <cstddef>
