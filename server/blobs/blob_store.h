@@ -92,6 +92,8 @@ class BlobStore {
   /// Stores a synced file of the spool under its hash; the file is gone afterwards.
   virtual Result<StoredBlob> publish(const std::filesystem::path& tmp, const std::string& sha256,
                                      std::uint64_t bytes) = 0;
+  /// Makes durable that a blob is there: whoever published it may have died on the way.
+  virtual Result<void> settle(const std::string& sha256) = 0;
   FileLayer& files() const { return *files_; }
 
  private:

@@ -66,6 +66,9 @@ class FileBlobs final : public BlobStore {
 
  protected:
   Result<StoredBlob> publish(const fs::path& tmp, const std::string& sha256, std::uint64_t bytes) override;
+  Result<void> settle(const std::string& sha256) override {
+    return sync_folder(files(), path_of(sha256).parent_path());
+  }
 
  private:
   fs::path path_of(const std::string& sha256) const { return folder() / "cas" / sha256.substr(0, 2) / sha256; }

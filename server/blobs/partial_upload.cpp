@@ -246,6 +246,9 @@ Result<PartialUpload> PartialUploads::find(const std::string& id, const std::str
   }
   if (!upload) return upload;
   if (upload->tenant != tenant) return unknown();
+  // Whoever named this record may have died before its sync, and a client that is told its offset forgets the bytes.
+  if (auto synced = sync_folder(blobs_->files(), blobs_->folder() / "tmp"); !synced)
+    return tl::make_unexpected(synced.error());
   upload->id = id;
   upload->done = done;
   return upload;
@@ -271,6 +274,7 @@ Result<StoredBlob> PartialUploads::store(const PartialUpload& whole) {
   if (fd < 0) {  // it went into the store, and then the server died or somebody else is about to say so
     KILN_TRY(now, find(whole.id, whole.tenant));
     if (now.sha256.empty() || !blobs_->exists(now.sha256)) return unknown();
+    if (auto settled = blobs_->settle(now.sha256); !settled) return tl::make_unexpected(settled.error());
     return StoredBlob{now.sha256, now.length, true};
   }
   HeldFile held(blobs_->files(), fd);

@@ -58,6 +58,7 @@ bool is_public6(const Bytes16& address) {
   if (starts_with(address, {0x00, 0x64, 0xFF, 0x9B}, 12)) return is_public4(ip4_at(address, 12));  // NAT64
   if (starts_with(address, {0x20, 0x02}, 2)) return is_public4(ip4_at(address, 2));                // 6to4
   if (starts_with(address, {0x20, 0x01, 0x0D, 0xB8}, 4)) return false;                             // documentation
+  if (starts_with(address, {0x3F, 0xFF}, 2) && address[2] < 0x10) return false;                    // documentation, too
   if (starts_with(address, {0x20, 0x01, 0x00}, 3) && address[3] < 2) return false;  // Teredo and protocols
   return (address[0] & 0xE0) == 0x20;                                               // 2000::/3 is all there is
 }

@@ -226,8 +226,7 @@ int make_part(const BakeInput& input, const WorkerOrder& order, Threads& threads
 
 /// Dies with the supervisor, also when that was gone before the request reached the kernel.
 void tie_to_parent(int parent) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) std::_Exit(kExitCanceled);
+  if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0 || ::getppid() != parent) std::_Exit(kExitCanceled);
 }
 
 int run_order(const Sandbox& sandbox) {

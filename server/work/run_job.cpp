@@ -135,6 +135,9 @@ Result<Wrote> persist(const StopSignal& stop, Millis lease, Write&& write) {
   }
 }
 
+/// What a worker can take in this time on all processors: it ends the worker when nobody looks at the clock.
+double processor_s(double wall_s) { return wall_s * std::max(1U, std::thread::hardware_concurrency()); }
+
 class JobRun {
  public:
   JobRun(const Claim& claim, StopSignal& stop, const WorkPlace& place)
@@ -204,7 +207,7 @@ class JobRun {
       };
     }
     return run_worker({place_.options.worker_command, folder.path(), memory, mapped_bytes(folder),
-                       desk != nullptr ? desk->worker_end() : -1},
+                       processor_s(limits.wall_s), desk != nullptr ? desk->worker_end() : -1},
                       {memory, limits.wall_s}, stop_, news);
   }
 
@@ -347,8 +350,10 @@ Result<std::string> run_plan(const JobInputs& inputs, const std::string& recipe,
   order.mode = WorkerMode::plan;
   KILN_TRY(folder, WorkFolder::make(place.options.folder / ("plan." + random_token()), place.blobs, order));
   const std::uint64_t memory = limits.memory_mb << 20;
-  const WorkerOutcome outcome = run_worker({place.options.worker_command, folder.path(), memory, mapped_bytes(folder)},
-                                           {memory, std::min(limits.wall_s, kPlanWallS)}, stop, {});
+  const double wall_s = std::min(limits.wall_s, kPlanWallS);
+  const WorkerOutcome outcome =
+      run_worker({place.options.worker_command, folder.path(), memory, mapped_bytes(folder), processor_s(wall_s)},
+                 {memory, wall_s}, stop, {});
   if (outcome.kind == Kind::done) return read_text(folder.result("plan.json"));
   if (outcome.kind == Kind::stopped) return fault("draining", "the server stops");
   return tl::make_unexpected(outcome.fault);

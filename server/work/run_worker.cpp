@@ -107,10 +107,14 @@ class Watch {
     if (ended_by_us() && seconds_since(*ended_at_) > limits_.grace_s) worker_.signal(SIGKILL);
   }
 
+  static Fault processor_time_is_over() {
+    return {"timed_out", "the job took more processor time than its limit of wall time leaves it", "/limits/wall_s"};
+  }
   bool ended_by_us() const { return ended_at_.has_value(); }
 
   WorkerOutcome finish(int status) {
     if (ended_by_us()) return outcome_;
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return conclude(Kind::timed_out, processor_time_is_over());
     if (WIFSIGNALED(status)) {
       return conclude(Kind::crashed,
                       {"worker_crashed", "the worker process died of signal " + std::to_string(WTERMSIG(status)), ""});

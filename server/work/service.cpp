@@ -336,6 +336,8 @@ Result<StoredBlob> LocalService::register_blob(const std::string& tenant,
                                                const std::function<Result<StoredBlob>()>& store) {
   KILN_TRY(gate, store_->enter_blob_gate());
   KILN_TRY(stored, store());
+  // Whether somebody else has these bytes is not this tenant's to know.
+  stored.existed = stored.existed && store_->knows_blob(stored.sha256, tenant).value_or(false);
   if (auto noted = store_->touch_blob(stored.sha256, stored.bytes, tenant); !noted) {
     return tl::make_unexpected(noted.error());
   }

@@ -90,18 +90,29 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return result;
 }
 
+/// Sets a limit, or keeps what is stricter already.
+template <class Resource>
+bool lower(pid_t pid, Resource resource, rlimit wanted) {
+  rlimit now{};
+  if (::prlimit(pid, resource, nullptr, &now) != 0) return false;
+  wanted.rlim_max = std::min(wanted.rlim_max, now.rlim_max);
+  wanted.rlim_cur = std::min(wanted.rlim_cur, wanted.rlim_max);
+  return ::prlimit(pid, resource, &wanted, nullptr) == 0;
+}
+
 /// From outside, so that it holds for every program that may be the worker.
-void limit(pid_t pid, const WorkerStart& start) {
-  const rlimit no_core{0, 0};
-  const rlimit files{kMaxFiles, kMaxFiles};
-  ::prlimit(pid, RLIMIT_CORE, &no_core, nullptr);
-  ::prlimit(pid, RLIMIT_NOFILE, &files, nullptr);
-  if (!kLimitAddressSpace || start.memory_bytes == 0) return;
+bool limit(pid_t pid, const WorkerStart& start) {
+  bool set = lower(pid, RLIMIT_CORE, {0, 0}) && lower(pid, RLIMIT_NOFILE, {kMaxFiles, kMaxFiles});
+  if (start.cpu_s > 0) {
+    const auto seconds = static_cast<rlim_t>(start.cpu_s) + 1;
+    set = set && lower(pid, RLIMIT_CPU, {seconds, seconds + 5});  // SIGXCPU, and KILL for who passes over it
+  }
+  if (!kLimitAddressSpace || start.memory_bytes == 0) return set;
   // Allocators and thread stacks reserve more than they use; resident memory is watched by the supervisor.
   // A scene is mapped, and what a reduction puts aside of it may be as large again.
   const rlim_t space = 2 * start.memory_bytes + 2 * start.mapped_bytes + (4ULL << 30);
-  const rlimit address_space{space, space};
-  ::prlimit(pid, RLIMIT_AS, &address_space, nullptr);
+  // No file of its is larger than that: all that it writes was in its memory or its scene.
+  return set && lower(pid, RLIMIT_AS, {space, space}) && lower(pid, RLIMIT_FSIZE, {space, space});
 }
 
 }  // namespace
@@ -127,9 +138,9 @@ Result<WorkerProcess> WorkerProcess::start(const WorkerStart& start) {
     ::close(ends[0]);
     return spawn_fault();
   }
-  limit(pid, start);
+  const bool limited = limit(pid, start);
   WorkerProcess worker(pid, ends[0], static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
-  if (worker.end_ < 0) return spawn_fault();  // the destructor ends it
+  if (!limited || worker.end_ < 0) return spawn_fault();  // the destructor ends it
   ::fcntl(worker.end_, F_SETFD, FD_CLOEXEC);
   return worker;
 }

@@ -18,6 +18,7 @@ struct WorkerStart {
   std::filesystem::path folder;      // absolute; becomes its current directory; takes its stderr as worker.log
   std::uint64_t memory_bytes = 0;    // resident memory it may use; address space is limited generously above it
   std::uint64_t mapped_bytes = 0;    // of the files that it maps, which take address space too
+  double cpu_s = 0;                  // processor time it may take; 0: without limit
   int input = -1;                    // becomes its descriptor 0, where the supervisor answers; -1: nothing to read
 };
 

@@ -130,6 +130,17 @@ std::map<pid_t, std::string> Daemon::workers() const {
   return found;
 }
 
+double Daemon::processor_s() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/stat");
+  std::string text((std::istreambuf_iterator<char>(file)), {});
+  std::istringstream fields(text.substr(text.rfind(')') + 2));
+  std::string skipped;
+  for (int i = 0; i < 11; ++i) fields >> skipped;  // state to cmajflt
+  double sum = 0, ticks = 0;
+  for (int i = 0; i < 4; ++i) sum += fields >> ticks ? ticks : 0;  // user and system time, its own and the reaped's
+  return sum / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
 Answer http_get(int port, const std::string& path) { return answer_of(client(port).Get(path)); }
 
 Answer http_post(int port, const std::string& path, const std::string& json,

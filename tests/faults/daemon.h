@@ -26,6 +26,7 @@ class Daemon {
   void kill_hard();                              // SIGKILL, reaped
   int terminate();                               // SIGTERM; the wait status
   std::map<pid_t, std::string> workers() const;  // by process id, the job's id
+  double processor_s() const;                    // its own, and that of the workers that it has reaped
 
  private:
   int wait_end();

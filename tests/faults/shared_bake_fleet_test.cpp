@@ -1,11 +1,5 @@
 // One bake over many workers: the bytes are those of a single machine, whoever is lost on the way.
 
-#include <signal.h>
-#include <unistd.h>
-
-#include <fstream>
-#include <sstream>
-
 #include "tests/faults/fleet_fixture.h"
 
 namespace kiln::testing {
@@ -30,18 +24,6 @@ std::map<std::string, std::string> hashes_of(const json& job) {
   return hashes;
 }
 
-/// User and system time of a server and of the workers that it has reaped.
-double processor_seconds(const Daemon& node) {
-  std::ifstream file("/proc/" + std::to_string(node.pid()) + "/stat");
-  std::string text((std::istreambuf_iterator<char>(file)), {});
-  std::istringstream fields(text.substr(text.rfind(')') + 2));
-  std::string skipped;
-  for (int i = 0; i < 11; ++i) fields >> skipped;  // state to cmajflt
-  double sum = 0, ticks = 0;
-  for (int i = 0; i < 4; ++i) sum += fields >> ticks ? ticks : 0;
-  return sum / static_cast<double>(::sysconf(_SC_CLK_TCK));
-}
-
 class SharedBakeFleet : public FleetTest {
  protected:
   /// Four servers of one worker with one thread each, that share all that takes longer than .1 s.
@@ -55,7 +37,7 @@ class SharedBakeFleet : public FleetTest {
   }
   double processor() {
     double all = 0;
-    for (const auto& [name, node] : nodes_) all += processor_seconds(*node);
+    for (const auto& [name, node] : nodes_) all += node->processor_s();
     return all;
   }
   static std::string story(const Daemon& node, const std::string& id) {

@@ -62,12 +62,16 @@ struct Client {
   double seconds = -1;  // until the answer was whole; -1: not yet
 };
 
+/// Clients, connections and uploads go to the servers in turn.
+using Ports = std::vector<int>;
+int port_of(const Ports& ports, int number) { return ports[static_cast<std::size_t>(number) % ports.size()]; }
+
 /// All of them connect at once, ask, and read to the end.
-std::vector<Client> ask_at_once(int port, const std::string& path, int count) {
+std::vector<Client> ask_at_once(const Ports& ports, const std::string& path, int count) {
   const std::string request = "GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
   const auto begin = Clock::now();
   std::vector<Client> clients;
-  for (int i = 0; i < count; ++i) clients.push_back({Socket(port), false, {}, -1});
+  for (int i = 0; i < count; ++i) clients.push_back({Socket(port_of(ports, i)), false, {}, -1});
   std::vector<pollfd> watched(clients.size());
   std::array<char, 16384> piece;
   for (bool open = true; open && seconds_since(begin) < kLongestS;) {
@@ -98,13 +102,14 @@ std::vector<Client> ask_at_once(int port, const std::string& path, int count) {
 }
 
 /// Connections that send a byte of their head every half second, and come again when they are thrown out.
-void be_slow(int port, int count, const std::atomic<bool>& over, std::atomic<int>& connected) {
+void be_slow(const Ports& ports, int count, const std::atomic<bool>& over, std::atomic<int>& connected) {
   std::vector<Socket> slow;
-  for (int i = 0; i < count; ++i) slow.emplace_back(port);
+  for (int i = 0; i < count; ++i) slow.emplace_back(port_of(ports, i));
   while (!over) {
     int open = 0;
-    for (Socket& socket : slow) {
-      if (!socket.open() || !socket.send("G")) socket = Socket(port);
+    for (int i = 0; i < count; ++i) {
+      Socket& socket = slow[static_cast<std::size_t>(i)];
+      if (!socket.open() || !socket.send("G")) socket = Socket(port_of(ports, i));
       open += socket.open() ? 1 : 0;
     }
     connected = open;
@@ -144,8 +149,10 @@ void upload_slowly(int port, int number, const std::atomic<bool>& over, std::ato
 }  // namespace
 
 void run_crowd(const Crowd& crowd, Breaches& breaches) {
-  Fleet fleet(false, 1, {"--workers", "1"});
-  const int port = fleet.node(0).port();
+  Fleet fleet(crowd.postgres, crowd.postgres ? 3 : 1, {"--workers", "1"});
+  Ports ports;
+  for (std::size_t i = 0; i < fleet.size(); ++i) ports.push_back(fleet.node(i).port());
+  const int port = ports.front();
   const std::string scene = upload_cube(port);
   const json job = json::parse(http_post(port, "/v1/jobs", cube_job(scene, 1)).body);
   const std::string path = "/v1/jobs/" + job.at("id").get<std::string>();
@@ -153,15 +160,15 @@ void run_crowd(const Crowd& crowd, Breaches& breaches) {
   std::atomic<bool> over{false};
   std::atomic<int> slow{0}, uploaded{0};
   std::vector<std::thread> others;
-  others.emplace_back([&] { be_slow(port, crowd.slow, over, slow); });
+  others.emplace_back([&] { be_slow(ports, crowd.slow, over, slow); });
   for (int i = 0; i < crowd.uploads; ++i)
-    others.emplace_back([&, i] { upload_slowly(port, i, over, uploaded, breaches); });
+    others.emplace_back([&, i] { upload_slowly(port_of(ports, i), i, over, uploaded, breaches); });
   std::this_thread::sleep_for(2s);
 
   std::vector<double> seconds;
   int answered = 0, least_slow = crowd.slow;
   for (int round = 0; round < kRounds; ++round) {
-    for (const Client& client : ask_at_once(port, path, crowd.clients)) {
+    for (const Client& client : ask_at_once(ports, path, crowd.clients)) {
       const bool good = client.seconds >= 0 && client.answer.starts_with("HTTP/1.1 200");
       answered += good ? 1 : 0;
       breaches.expect(good, "a client was answered: " + client.answer.substr(0, 60));
@@ -179,10 +186,11 @@ void run_crowd(const Crowd& crowd, Breaches& breaches) {
   breaches.expect(p99 < 1, "the 99th percentile of a status is a second or more");
   breaches.expect(least_slow > crowd.slow / 2, "the slow connections were not there");
   std::printf(
-      "{\"run\":\"crowd\",\"clients\":%d,\"rounds\":%d,\"slow\":%d,\"slow_at_least\":%d,\"uploads\":%d,"
+      "{\"run\":\"crowd\",\"engine\":\"%s\",\"servers\":%zu,\"clients\":%d,\"rounds\":%d,\"slow\":%d,\"slow_at_least\":"
+      "%d,\"uploads\":%d,"
       "\"uploads_done\":%d,\"answered\":%d,\"median_s\":%.3f,\"p99_s\":%.3f,\"worst_s\":%.3f,\"broken\":%d}\n",
-      crowd.clients, kRounds, crowd.slow, least_slow, crowd.uploads, uploaded.load(), answered, median, p99,
-      seconds.back(), breaches.count());
+      crowd.postgres ? "postgres" : "sqlite", ports.size(), crowd.clients, kRounds, crowd.slow, least_slow,
+      crowd.uploads, uploaded.load(), answered, median, p99, seconds.back(), breaches.count());
 }
 
 }  // namespace kiln::testing

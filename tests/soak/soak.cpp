@@ -2,8 +2,9 @@
 // only.
 //   kiln_soak kills sqlite|postgres CYCLES
 //   kiln_soak stale ROUNDS
-//   kiln_soak crowd CLIENTS SLOW UPLOADS
+//   kiln_soak crowd sqlite|postgres CLIENTS SLOW UPLOADS
 //   kiln_soak steady SECONDS
+//   kiln_soak split MODEL.glb|pit SAMPLES SHARE_S
 // Exit 0: every promise held; 1: a line says which did not, or why the run could not go on; 77: no PostgreSQL here.
 
 #include "tests/soak/soak.h"
@@ -19,8 +20,10 @@ namespace kiln::testing {
 namespace {
 
 int usage() {
-  std::fputs("kiln_soak kills sqlite|postgres CYCLES | stale ROUNDS | crowd CLIENTS SLOW UPLOADS | steady SECONDS\n",
-             stderr);
+  std::fputs(
+      "kiln_soak kills sqlite|postgres CYCLES | stale ROUNDS | crowd sqlite|postgres CLIENTS SLOW UPLOADS |\n"
+      "          steady SECONDS | split MODEL.glb|pit SAMPLES SHARE_S\n",
+      stderr);
   return 2;
 }
 
@@ -41,7 +44,8 @@ int count_of(const char* text) {
 int run(const std::vector<std::string>& words) {
   if (words.size() < 2) return usage();
   const std::string& what = words[0];
-  const bool postgres = what == "stale" || (what == "kills" && words[1] == "postgres");
+  const bool chosen = (what == "kills" || what == "crowd") && words[1] == "postgres";
+  const bool postgres = chosen || what == "stale" || what == "split";
   if (postgres && postgres_programs().empty()) {
     std::puts("skipped: the package postgresql is not installed");
     return 77;
@@ -51,10 +55,12 @@ int run(const std::vector<std::string>& words) {
     run_kills({postgres, count_of(words[2].c_str())}, breaches);
   } else if (what == "stale" && words.size() == 2) {
     run_stale({count_of(words[1].c_str())}, breaches);
-  } else if (what == "crowd" && words.size() == 4) {
-    run_crowd({count_of(words[1].c_str()), count_of(words[2].c_str()), count_of(words[3].c_str())}, breaches);
+  } else if (what == "crowd" && words.size() == 5) {
+    run_crowd({postgres, count_of(words[2].c_str()), count_of(words[3].c_str()), count_of(words[4].c_str())}, breaches);
   } else if (what == "steady" && words.size() == 2) {
     run_steady({count_of(words[1].c_str())}, breaches);
+  } else if (what == "split" && words.size() == 4) {
+    run_split({words[1], count_of(words[2].c_str()), std::atof(words[3].c_str())}, breaches);
   } else {
     return usage();
   }

@@ -77,9 +77,11 @@ struct Stale {
 void run_stale(const Stale&, Breaches&);
 
 struct Crowd {
+  bool postgres = false;
   int clients = 200, slow = 500, uploads = 16;
 };
-/// So many clients at once, in rounds, beside connections that never end their head and uploads that take their time.
+/// So many clients at once, in rounds, spread over the servers of the fleet, beside connections that never end their
+/// head and uploads that take their time.
 void run_crowd(const Crowd&, Breaches&);
 
 struct Steady {
@@ -87,5 +89,14 @@ struct Steady {
 };
 /// Jobs without a pause; memory and descriptors of the server meanwhile.
 void run_steady(const Steady&, Breaches&);
+
+struct Split {
+  std::string model;    // a GLB file; "pit": that of the tests
+  int samples = 65536;  // of a point
+  double share_s = 10;  // --share-s of the servers; 10 is theirs
+};
+/// One bake of the model by a worker with four threads, and by four workers with one: the same bytes, and processor
+/// time of all processes.
+void run_split(const Split&, Breaches&);
 
 }  // namespace kiln::testing

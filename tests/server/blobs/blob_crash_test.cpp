@@ -1,4 +1,5 @@
-// Every system call of a commit as the last one, and as one that fails.
+// Every system call of a commit as the last one, and as one that fails; and every pair of such calls, the second in the
+// attempt after the first.
 
 #include <fstream>
 
@@ -8,18 +9,19 @@
 namespace kiln::testing {
 namespace {
 
-const std::string kText = "bytes that must be whole or not there";
+const std::string kText = "bytes that must be whole or not there", kOther = "a second result";
 
 enum class Way { upload, adoption };
 
 class BlobCrash : public BlobTest, public ::testing::WithParamInterface<Way> {
  protected:
   /// Puts kText in the way under test.
-  Result<StoredBlob> put(BlobStore& store) const {
+  Result<StoredBlob> put(BlobStore& store, FaultyFiles& layer) const {
     if (GetParam() == Way::adoption) {
       std::ofstream(folder_ / "result") << kText;
-      std::ofstream(folder_ / "other") << "a second result";
+      std::ofstream(folder_ / "other") << kOther;
       const std::vector files{folder_ / "result", folder_ / "other"};
+      for (const auto& file : files) layer.written_by_another(file);
       auto stored = store.adopt(files);
       if (!stored) return tl::make_unexpected(stored.error());
       return stored->front();
@@ -37,15 +39,36 @@ class BlobCrash : public BlobTest, public ::testing::WithParamInterface<Way> {
     std::filesystem::create_directory(folder_);
   }
 
+  /// A start, and kText put after it, with this blow at this call of theirs; false if there was no such call.
+  bool live(FaultyFiles& files, const Blow& blow, int call, bool& acknowledged) const {
+    files.restart();
+    try {
+      const auto store = open_file_blobs(folder_, files).value();
+      files.strike(blow, call);
+      store->remove_dead_writers();
+      acknowledged = put(*store, files).has_value() || acknowledged;
+    } catch (const Killed&) {
+    }
+    const bool struck = files.struck();
+    if (blow.power_cut) files.cut_power();
+    return struck;
+  }
+
   /// After any end: what is there is sound, nothing half is left, and trying again works.
   void expect_recovers(bool acknowledged) {
     FaultyFiles healthy;
+    expect_recovers(acknowledged, healthy);
+  }
+  void expect_recovers(bool acknowledged, FaultyFiles& healthy) {
     const auto store = open_file_blobs(folder_, healthy).value();
     store->remove_dead_writers();
-    expect_sound(*store);
+    for (const std::string& text : {kText, kOther}) {
+      const std::string name = sha256_hex(bytes_of(text));
+      EXPECT_TRUE(!store->exists(name) || read(*store, name) == text);
+    }
     EXPECT_EQ(files_in(folder_ / "tmp"), 0U);
     EXPECT_TRUE(!acknowledged || store->exists(sha256_hex(bytes_of(kText))));
-    EXPECT_EQ(read(*store, put(*store).value().sha256), kText);
+    EXPECT_EQ(read(*store, put(*store, healthy).value().sha256), kText);
   }
 };
 
@@ -59,7 +82,7 @@ TEST_P(BlobCrash, AKillAfterAnyCallLosesNothingAcknowledged) {
       try {
         const auto store = open_file_blobs(folder_, files).value();
         files.kill_at = files.calls + call;
-        acknowledged = put(*store).has_value();
+        acknowledged = put(*store, files).has_value();
         killed = false;
       } catch (const Killed&) {
       }
@@ -95,7 +118,7 @@ TEST_P(BlobCrash, AFailureOfAnyCallIsToldAndLeavesNothingHalf) {
       files.error = error;
       const auto store = open_file_blobs(folder_, files).value();
       files.fail_at = files.calls + call;
-      const auto stored = put(*store);
+      const auto stored = put(*store, files);
       failed = !files.failed_call.empty();
       SCOPED_TRACE("call " + std::to_string(call) + " " + files.failed_call);
       // A folder or a read-only file that does not close properly has lost nothing.
@@ -110,11 +133,40 @@ TEST_P(BlobCrash, AFailureOfAnyCallIsToldAndLeavesNothingHalf) {
   }
 }
 
+TEST_P(BlobCrash, ASecondBlowInTheAttemptAfterTheFirstLosesNothingAcknowledged) {
+  const int stride = pair_stride(16);
+  int pairs = 0;
+  FaultyFiles files;
+  files.short_writes = true;
+  for (const Blow& first : kBlows) {
+    for (const Blow& second : kBlows) {
+      bool struck = true;
+      for (int i = 0; struck; ++i) {
+        bool struck_again = true;
+        for (int j = i % stride; struck_again; j += stride, ++pairs) {
+          bool acknowledged = false;
+          struck = live(files, first, i, acknowledged);
+          struck_again = live(files, second, j, acknowledged);
+          SCOPED_TRACE(std::string(first.name) + " at " + std::to_string(i) + ", then " + second.name + " at " +
+                       std::to_string(j));
+          files.restart();
+          expect_recovers(acknowledged, files);
+          ASSERT_FALSE(HasFailure());
+          ASSERT_LT(i + j, 200);
+          remove_files({kText, kOther});
+          files.keep_all();
+        }
+      }
+    }
+  }
+  std::printf("%d pairs\n", pairs);
+}
+
 TEST_P(BlobCrash, InterruptedAndShortCallsAreCarriedOn) {
   FaultyFiles files;
   const auto store = open_file_blobs(folder_, files).value();
   files.interrupt = files.short_writes = true;
-  const auto stored = put(*store);
+  const auto stored = put(*store, files);
   ASSERT_TRUE(stored);
   files.interrupt = files.short_writes = false;
   EXPECT_EQ(read(*store, stored->sha256), kText);

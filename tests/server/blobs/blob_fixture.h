@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "server/blobs/file_blobs.h"
 
@@ -23,6 +24,16 @@ class BlobTest : public ::testing::Test {
   }
   ~BlobTest() override { std::filesystem::remove_all(folder_); }
 
+  /// Removes the blobs of these texts and all that is in the spool; the folders stay, since to make them takes longer
+  /// than most tests.
+  void remove_files(std::initializer_list<std::string> texts) const {
+    for (const std::string& text : texts) {
+      const std::string name = sha256_hex(bytes_of(text));
+      std::filesystem::remove(folder_ / "cas" / name.substr(0, 2) / name);
+    }
+    std::filesystem::remove_all(folder_ / "tmp");
+    std::filesystem::create_directories(folder_ / "tmp");
+  }
   static std::string read(const BlobStore& store, const std::string& sha256) {
     const auto reader = store.open_blob(sha256).value();
     std::string text(reader.size(), ' ');

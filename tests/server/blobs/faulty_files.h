@@ -1,13 +1,20 @@
 #pragma once
-// A file layer that fails or stops at a chosen call, and a power cut that forgets what was not synced.
+// A file layer that fails or stops at a chosen call, and a power cut that forgets what was not synced. It outlives the
+// process that it stops: what one life left unsynced, a power cut in the next one still forgets.
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +24,17 @@ namespace kiln::testing {
 
 /// Thrown at the chosen call: the process is dead from here on.
 struct Killed {};
+
+/// How a life ends, or what goes wrong in it.
+struct Blow {
+  const char* name;
+  int error = 0;  // of the call that fails; 0: the process is killed after it
+  bool power_cut = false;
+};
+inline constexpr Blow kBlows[] = {{"kill"}, {"power cut", 0, true}, {"EIO", EIO}};
+
+/// Of all pairs of blows one in `otherwise` is tried; with KILN_SOAK in the environment every one.
+inline int pair_stride(int otherwise) { return std::getenv("KILN_SOAK") != nullptr ? 1 : otherwise; }
 
 /// Works on real files. Calls are numbered from 0.
 class FaultyFiles : public FileLayer {
@@ -29,12 +47,33 @@ class FaultyFiles : public FileLayer {
   bool short_writes = false;
   std::string failed_call;
 
+  ~FaultyFiles() override { restart(); }
+  /// The next process on the same files. The kernel closes what the dead one had open.
+  void restart() {
+    for (const auto& [fd, path] : paths_) ::close(fd);
+    paths_.clear();
+    dead_ = false;
+    kill_at = fail_at = -1;
+    failed_call.clear();
+  }
+  /// `call` calls from now.
+  void strike(const Blow& blow, int call) {
+    error = blow.error;
+    (blow.error == 0 ? kill_at : fail_at) = calls + call;
+  }
+  bool struck() const { return dead_ || !failed_call.empty(); }
+  /// Somebody else wrote this file, and synced nothing.
+  void written_by_another(const std::string& path) {
+    unsynced_bytes_[path] = 0;
+    unsynced_entries_.push_back({path, "", {}});
+  }
+
   int open(const std::string& path, int flags, unsigned mode) override {
     return step<int>("open", true, [&] {
       const bool created = (flags & O_CREAT) != 0 && !std::filesystem::exists(path);
       const int fd = FileLayer::open(path, flags, mode);
       if (fd >= 0) paths_[fd] = path;
-      if (fd >= 0 && created) unsynced_entries_.push_back({path, "", false});
+      if (fd >= 0 && created) unsynced_entries_.push_back({path, "", {}});
       return fd;
     });
   }
@@ -61,54 +100,91 @@ class FaultyFiles : public FileLayer {
     });
   }
   int close(int fd) override {
+    paths_.erase(fd);
     if (dead_) return ::close(fd);      // the kernel does it for the dead
     if (calls == fail_at) ::close(fd);  // a close that fails has closed all the same (close(2))
+    if (calls == kill_at) {             // destructors close, and may not throw: the next call does
+      ++calls;
+      dead_ = true;
+      return FileLayer::close(fd);
+    }
     return step<int>("close", false, [&] { return FileLayer::close(fd); });
   }
   int rename(const std::string& from, const std::string& to) override {
     return step<int>("rename", false, [&] {
-      const bool existed = std::filesystem::exists(to);
+      Entry entry{to, from, contents(to)};
       const int done = FileLayer::rename(from, to);
       if (done == 0) {
         unsynced_bytes_.erase(to);
-        if (auto moved = unsynced_bytes_.extract(from); !moved.empty()) unsynced_bytes_[to] = moved.mapped();
-        unsynced_entries_.push_back({to, from, existed});
+        move_unsynced(from, to);
+        unsynced_entries_.push_back(std::move(entry));
       }
       return done;
     });
   }
   int unlink(const std::string& path) override {
-    return step<int>("unlink", false, [&] { return FileLayer::unlink(path); });
+    return step<int>("unlink", false, [&] {
+      Entry entry{path, path, contents(path)};
+      const int done = FileLayer::unlink(path);
+      if (done == 0) unsynced_entries_.push_back(std::move(entry));
+      return done;
+    });
   }
   int mkdir(const std::string& path, unsigned mode) override {
     return step<int>("mkdir", false, [&] {
+      if (!folders_.insert(path).second) return fail<int>(EEXIST);  // known, and quicker than to ask
       const int done = FileLayer::mkdir(path, mode);
-      if (done == 0) unsynced_entries_.push_back({path, "", false});
+      if (done == 0) unsynced_entries_.push_back({path, "", {}});
       return done;
     });
   }
 
-  /// What a power cut leaves: names and bytes that were synced. Of unsynced bytes none is left.
+  /// What a power cut leaves: names and bytes that were synced. Of unsynced bytes none is left; names that were given,
+  /// replaced or taken away since the last sync of their folder are as they were before.
   void cut_power() {
     for (auto entry = unsynced_entries_.rbegin(); entry != unsynced_entries_.rend(); ++entry) {
-      if (!entry->from.empty() && !entry->replaced) FileLayer::rename(entry->path, entry->from);
-      if (entry->from.empty()) std::filesystem::remove_all(entry->path);
+      if (entry->from.empty()) {
+        folders_.erase(entry->path);
+        std::filesystem::remove_all(entry->path);
+      } else if (entry->from != entry->path && std::filesystem::exists(entry->path)) {
+        FileLayer::rename(entry->path, entry->from);
+        move_unsynced(entry->path, entry->from);
+      }
+      if (entry->before) std::ofstream(entry->path, std::ios::binary) << *entry->before;
     }
     for (const auto& [path, synced] : unsynced_bytes_) {
       if (std::filesystem::exists(path) && std::filesystem::file_size(path) > synced) {
         std::filesystem::resize_file(path, synced);
       }
     }
+    keep_all();
+  }
+  /// All that was done so far is durable.
+  void keep_all() {
+    unsynced_entries_.clear();
+    unsynced_bytes_.clear();
   }
 
  private:
+  /// A change of a folder that it may forget: a new name (`from` is empty), a rename, or a name taken away (both
+  /// equal).
   struct Entry {
-    std::string path, from;  // a name that a folder has but may forget; `from`: its name before a rename
-    bool replaced;           // the name stood for the same bytes before
+    std::string path, from;
+    std::optional<std::string> before;  // the bytes that the name stood for
   };
+
+  static std::optional<std::string> contents(const std::string& path) {
+    if (!std::filesystem::is_regular_file(path)) return {};
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  void move_unsynced(const std::string& from, const std::string& to) {
+    if (auto moved = unsynced_bytes_.extract(from); !moved.empty()) unsynced_bytes_[to] = moved.mapped();
+  }
 
   template <class T>
   T step(const char* name, bool interruptible, const std::function<T()>& call) {
+    if (dead_ && std::uncaught_exceptions() == 0) throw Killed();
     if (dead_) return fail<T>(EIO);
     const int number = calls++;
     if (number == fail_at) {
@@ -131,6 +207,7 @@ class FaultyFiles : public FileLayer {
   std::map<int, std::string> paths_;
   std::map<std::string, std::uintmax_t> unsynced_bytes_;  // path, and how many of its bytes were synced
   std::vector<Entry> unsynced_entries_;
+  std::set<std::string> folders_;
 };
 
 }  // namespace kiln::testing

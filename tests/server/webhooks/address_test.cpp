@@ -70,6 +70,7 @@ TEST(PublicAddress, ThoseAtHomeAreNot) {
                            "2002:a9fe:a9fe::1",
                            "2001::1",
                            "2001:db8::1",
+                           "3fff::1",
                            "fc00::1",
                            "fdff::1",
                            "fe80::1",

@@ -3,6 +3,9 @@
 #include "server/work/run_worker.h"
 
 #include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
 
 #include "core/bake/recipe.h"
 #include "server/work/content_key.h"
@@ -17,6 +20,31 @@ TEST(RunWorker, AProgramThatIsNotThereIsTroubleOfTheMachineAndNotOfTheJob) {
   const auto outcome = run_worker({{"/nonexistent/worker"}, "/tmp", 0}, {}, stop, {});
   EXPECT_EQ(outcome.kind, WorkerOutcome::Kind::trouble);
   EXPECT_EQ(outcome.fault.code, "spawn_failed");
+}
+
+class WorkerLimitsTest : public ::testing::Test {
+ protected:
+  WorkerLimitsTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "kiln_limits.XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~WorkerLimitsTest() override { std::filesystem::remove_all(folder_); }
+  WorkerStart script(const std::string& text) const { return {{"/bin/sh", "-c", text}, folder_, 64u << 20}; }
+  std::filesystem::path folder_;
+};
+
+TEST_F(WorkerLimitsTest, ProcessorTimeEndsAWorkerWithoutAnybodyWatchingTheClock) {
+  WorkerStart start = script("while :; do :; done");
+  start.cpu_s = 1;
+  const auto outcome = run_worker(start, {}, StopSignal(), {});
+  EXPECT_EQ(outcome.kind, WorkerOutcome::Kind::timed_out);
+  EXPECT_EQ(outcome.fault.where, "/limits/wall_s");
+}
+
+TEST_F(WorkerLimitsTest, AFileOfAWorkerHasAnEnd) {
+  static_cast<void>(run_worker(script("truncate -s 100G big; truncate -s 1G small"), {}, StopSignal(), {}));
+  EXPECT_LT(std::filesystem::file_size(folder_ / "big"), 8ULL << 30);
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "small"), 1ULL << 30);
 }
 
 TEST(RunWorker, TheFirstReasonToStopCounts) {

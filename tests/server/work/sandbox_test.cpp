@@ -7,7 +7,10 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -71,6 +74,17 @@ TEST_F(SandboxTest, AWorkerCannotChangeItsInputsWhichAreTheStoresOwnBlobs) {
   EXPECT_NE(try_inside([&] { return ::rename(from.c_str(), to.c_str()); }), 0);
   EXPECT_NE(try_inside([&] { return ::truncate(from.c_str(), 0); }), 0);
   EXPECT_EQ(std::filesystem::file_size(folder_ / "inputs" / "0"), 5U);
+}
+
+TEST_F(SandboxTest, AWorkerCannotMakeItsInputsUnreadableNorOlder) {
+  const std::string input = folder_ / "inputs" / "0";
+  EXPECT_EQ(try_inside([&] { return ::chmod(input.c_str(), 0); }), EPERM);
+  EXPECT_EQ(try_inside([&] { return ::fchmodat(AT_FDCWD, input.c_str(), 0, 0); }), EPERM);
+  EXPECT_EQ(try_inside([&] { return ::syscall(452, AT_FDCWD, input.c_str(), 0, 0); }), EPERM) << "fchmodat2";
+  EXPECT_EQ(try_inside([&] { return ::fchmod(::open(input.c_str(), O_RDONLY), 0); }), EPERM);
+  EXPECT_EQ(try_inside([&] { return ::chown(input.c_str(), ::getuid(), ::getgid()); }), EPERM);
+  EXPECT_EQ(try_inside([&] { return ::utimensat(AT_FDCWD, input.c_str(), nullptr, 0); }), EPERM);
+  EXPECT_EQ(try_inside([&] { return ::setxattr(input.c_str(), "user.a", "b", 1, 0); }), EPERM);
 }
 
 TEST_F(SandboxTest, AWorkerHasNoNetworkNoOtherProgramsAndNoChildren) {

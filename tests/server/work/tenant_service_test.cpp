@@ -12,11 +12,12 @@ class TenantTest : public ServiceTest {
  protected:
   TenantTest() : a_(start(), "a", 2), b_(*service_, "b", 0) {}
 
-  static std::string put_for(Service& service, const std::string& text) {
+  static StoredBlob stored_for(Service& service, const std::string& text) {
     auto upload = service.put_asset({}).value();
     EXPECT_TRUE(upload->write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
-    return upload->finish().value().sha256;
+    return upload->finish().value();
   }
+  static std::string put_for(Service& service, const std::string& text) { return stored_for(service, text).sha256; }
   Submission scene_of(Service& service, const std::string& label) {
     Submission job;
     job.scene_sha256 = put_for(service, "the scene");
@@ -54,6 +55,12 @@ TEST_F(TenantTest, AnothersAssetCannotBeReadUsedOrSeenToBeThere) {
   stolen.scene_sha256 = sha256;
   EXPECT_EQ(b_.submit(stolen).error().code, "asset_not_found");
   EXPECT_EQ(b_.plan(stolen).error().code, "asset_not_found");
+}
+
+TEST_F(TenantTest, WhoUploadsWhatAnotherHasIsNotTold) {
+  EXPECT_FALSE(stored_for(a_, "a secret scene").existed);
+  EXPECT_FALSE(stored_for(b_, "a secret scene").existed);
+  EXPECT_TRUE(stored_for(b_, "a secret scene").existed) << "its own";
 }
 
 TEST_F(TenantTest, WhoSeesAllFindsAnAssetAndBakesItWithoutHandingItOutByLooking) {
