@@ -7,16 +7,16 @@ namespace kiln {
 PointField make_point_field(const PointHierarchy& points, std::span<const Vec3f> light, Threads& threads) {
   EXPECTS(light.size() == points.points.size());
   PointField out;
-  for (std::size_t level = 0; level < points.levels(); ++level) {
+  for (std::size_t level = 0; level < points.placed_levels(); ++level) {
     for (std::uint32_t p = points.begin(level); p < points.level_end[level]; ++p) {
       const SurfaceSite& site = points.points[p].site;
       out.sites.push_back({site.position, pack_normal(site.normal), static_cast<std::uint8_t>(level)});
     }
+    out.level_end.push_back(points.level_end[level]);
   }
-  out.level_end = points.level_end;
   const MeshlessBasis basis = basis_of(out, threads);
   for (std::uint32_t j = 0; j < basis.functions(); ++j) out.radius.push_back(basis.radius(j));
-  out.coefficients = basis.coefficients(light, threads);
+  out.coefficients = basis.coefficients(light.first(out.sites.size()), threads);
   return out;
 }
 

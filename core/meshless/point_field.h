@@ -23,7 +23,8 @@ struct PointField {
   std::vector<Vec3f> coefficients;       // a_j
 };
 
-/// `light` of each point.
+/// `light` of each point. Points that were asked for besides (demand.h) are left out: they are no Poisson set, and
+/// where ten of them are far apart their functions would show as discs.
 PointField make_point_field(const PointHierarchy&, std::span<const Vec3f> light, Threads&);
 
 /// The basis of a field; its radii are those of the field.
