@@ -20,15 +20,14 @@ class FileBytes {
 
   /// Fails with file_not_found (not a regular file) and file_unreadable; `name` is what places call it.
   static Result<FileBytes> map(const std::string& path, const std::string& name);
+  /// Of an open file, which may be closed afterwards.
+  static Result<FileBytes> map(int descriptor, const std::string& name);
 
   operator std::span<const std::uint8_t>() const { return bytes_; }  // NOLINT(google-explicit-constructor)
   std::size_t size() const { return bytes_.size(); }
   bool empty() const { return bytes_.empty(); }
 
  private:
-  friend class SpillFile;
-  static Result<FileBytes> map(int descriptor, const std::string& name);
-
   std::shared_ptr<const void> owner_;
   std::span<const std::uint8_t> bytes_;
 };

@@ -11,13 +11,16 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
+#include <map>
 #include <new>
 #include <optional>
+#include <span>
 #include <system_error>
 #include <thread>
 
 #include "core/bake/bake.h"
+#include "core/base/file_bytes.h"
 #include "core/base/threads.h"
 #include "server/work/sandbox.h"
 #include "server/work/shared_bake.h"
@@ -51,22 +54,46 @@ void tell(const WorkerLine& line) {
   write_all(kWorkerPipe, text.data(), text.size());
 }
 
-Bytes read_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  if (!in) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
-  Bytes bytes(static_cast<std::size_t>(in.tellg()));
-  in.seekg(0);
-  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!in) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
-  return bytes;
-}
+/// The files of a job, opened before the worker is locked in: from then on these descriptors are its only way to them.
+class InputFiles {
+ public:
+  /// `job.json` and all of `inputs/`.
+  explicit InputFiles(const std::filesystem::path& folder) {
+    add(folder, kOrderFile);
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "inputs"))
+      add(folder, "inputs/" + entry.path().filename().string());
+  }
+  ~InputFiles() {
+    for (const auto& [name, file] : files_) ::close(file);
+  }
+  InputFiles(const InputFiles&) = delete;
+  InputFiles& operator=(const InputFiles&) = delete;
 
-/// Blobs never change: they may be mapped.
-FileBytes map_file(const std::string& path) {
-  auto bytes = FileBytes::map(path, "scene");
-  if (!bytes) throw WorkerTrouble{{"internal", "the worker could not read an input", ""}};
-  return std::move(*bytes);
-}
+  Bytes read(const std::string& name) const {
+    const FileBytes mapped = map(name);
+    const std::span<const std::uint8_t> bytes = mapped;
+    return {bytes.begin(), bytes.end()};
+  }
+  /// Blobs never change: they may be mapped.
+  FileBytes map(const std::string& name) const {
+    const auto found = files_.find(name);
+    auto bytes = FileBytes::map(found == files_.end() ? -1 : found->second, "scene");
+    if (!bytes) throw unreadable();
+    return std::move(*bytes);
+  }
+
+  static constexpr const char* kOrderFile = "job.json";
+
+ private:
+  static WorkerTrouble unreadable() { return {{"internal", "the worker could not read an input", ""}}; }
+  void add(const std::filesystem::path& folder, const std::string& name) {
+    const int file = ::open((folder / name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (file < 0) throw unreadable();
+    files_[name] = file;
+  }
+
+  std::map<std::string, int> files_;
+};
 
 void write_file(const std::string& path, const void* data, std::size_t size) {
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -75,14 +102,14 @@ void write_file(const std::string& path, const void* data, std::size_t size) {
   ::close(fd);
 }
 
-WorkerOrder read_order() {
-  const Bytes text = read_file("job.json");
+WorkerOrder read_order(const InputFiles& files) {
+  const Bytes text = files.read(InputFiles::kOrderFile);
   auto order = parse_order({reinterpret_cast<const char*>(text.data()), text.size()});
   if (!order) throw WorkerTrouble{order.error()};
   return *order;
 }
 
-BakeInput read_input(const WorkerOrder& order) {
+BakeInput read_input(const WorkerOrder& order, const InputFiles& files) {
   auto recipe = parse_recipe(order.recipe);
   if (!recipe) throw WorkerTrouble{{"internal", "the worker did not understand its recipe", ""}};
   BakeInput input;
@@ -90,13 +117,13 @@ BakeInput read_input(const WorkerOrder& order) {
   input.recipe = std::move(*recipe);
   std::size_t place = 0;
   input.scene.name = order.inputs.scene.name;
-  input.scene.main = map_file(input_path(place));
+  input.scene.main = files.map(input_path(place));
   for (const NamedBlob& file : order.inputs.resources) {
-    input.scene.resources[file.name] = read_file(input_path(++place));
+    input.scene.resources[file.name] = files.read(input_path(++place));
   }
   if (order.inputs.environment) {
     input.environment_name = order.inputs.environment->name;
-    input.environment = read_file(input_path(++place));
+    input.environment = files.read(input_path(++place));
   }
   return input;
 }
@@ -211,9 +238,9 @@ int make_bake(const BakeInput& input, const WorkerOrder& order, Threads& threads
   return kExitDone;
 }
 
-int make_part(const BakeInput& input, const WorkerOrder& order, Threads& threads) try {
+int make_part(const BakeInput& input, const WorkerOrder& order, const InputFiles& files, Threads& threads) try {
   if (!order.range) throw WorkerTrouble{{"internal", "the worker was given no range", ""}};
-  TakingLoops loops(*order.range, map_file("inputs/journal"), "out/range");
+  TakingLoops loops(*order.range, files.map("inputs/journal"), "out/range");
   threads.share_with(&loops);
   const auto output = bake_order(input, order, threads);
   if (!output) return refuse(output.error());
@@ -229,20 +256,20 @@ void tie_to_parent(int parent) {
   if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0 || ::getppid() != parent) std::_Exit(kExitCanceled);
 }
 
-int run_order(const Sandbox& sandbox) {
-  const WorkerOrder order = read_order();
+int run_order(const Sandbox& sandbox, const InputFiles& files) {
+  const WorkerOrder order = read_order(files);
   tie_to_parent(order.parent);
   if (order.require_sandbox && !sandbox.whole()) {
     throw WorkerTrouble{{"internal", "this machine gives workers no sandbox, and the server demands one", ""}};
   }
   Threads threads(order.threads);
   const TermWatch watch(threads);
-  const BakeInput input = read_input(order);
+  const BakeInput input = read_input(order, files);
   switch (order.mode) {
     case WorkerMode::plan:
       return make_plan(input, threads);
     case WorkerMode::part:
-      return make_part(input, order, threads);
+      return make_part(input, order, files, threads);
     case WorkerMode::bake:
       break;
   }
@@ -262,7 +289,8 @@ int bake_worker_main(int argc, char** argv) try {
   ::pthread_sigmask(SIG_BLOCK, &TermWatch::set(), nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   if (argc != 2 || ::chdir(argv[1]) != 0) return kExitInternal;
-  return run_order(enter_sandbox(argv[1]));
+  const InputFiles files(argv[1]);
+  return run_order(enter_sandbox(argv[1]), files);
 } catch (const Cancelled&) {
   return kExitCanceled;
 } catch (const WorkerTrouble& trouble) {

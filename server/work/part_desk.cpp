@@ -236,7 +236,7 @@ bool PartDesk::hold(const std::string& part) {
 }
 
 RangeReply PartDesk::fetch(const PartState& part, const LoopRange& range) {
-  const std::string file = "inputs/range." + std::to_string(fetched_++);
+  const std::string file = "ranges/" + std::to_string(fetched_++);
   last_fetched_ = folder_ / file;
   if (!place_.blobs.place(part.sha256, last_fetched_)) return {range, ""};
   return {range, file};

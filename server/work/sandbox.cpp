@@ -74,7 +74,7 @@ bool lock_files(const std::filesystem::path& folder) {
   const landlock_ruleset_attr all{known};
   const Descriptor rules{static_cast<int>(::syscall(SYS_landlock_create_ruleset, &all, sizeof all, 0))};
   if (rules.number < 0) return false;
-  bool allowed = allow(rules.number, folder, kRead & known) && allow(rules.number, folder / "out", kWrite & known);
+  bool allowed = allow(rules.number, folder / "out", kWrite & known) && allow(rules.number, folder / "ranges", kRead);
   // Libraries that are loaded late (TBB's allocator and topology), and what they ask about this machine.
   for (const char* path : {"/usr", "/lib", "/lib64", "/sys/devices/system", "/proc/self"}) {
     allowed = allowed && allow(rules.number, path, (kRead | LANDLOCK_ACCESS_FS_EXECUTE) & known);

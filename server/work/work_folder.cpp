@@ -28,6 +28,7 @@ Result<void> place_input(const BlobStore& blobs, const NamedBlob& file, const fs
 Result<WorkFolder> WorkFolder::make(const fs::path& path, const BlobStore& blobs, const WorkerOrder& order) {
   std::error_code error;
   fs::create_directories(path / "inputs", error);
+  if (!error) fs::create_directory(path / "ranges", error);
   WorkFolder folder(path);
   if (!error) fs::create_directory(path / "out", error);
   if (error) return folder_fault(error);

@@ -1,5 +1,5 @@
 #pragma once
-// The folder that one worker sees: <data>/work/<job>.<token>/ with job.json, inputs/0.., out/, worker.log.
+// The folder that one worker sees: <data>/work/<job>.<token>/ with job.json, inputs/0.., ranges/, out/, worker.log.
 
 #include <filesystem>
 

@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 class PartDeskTest : public ::testing::Test {
  protected:
   PartDeskTest() {
-    std::filesystem::create_directories(work_ / "inputs");
+    std::filesystem::create_directories(work_ / "ranges");
     std::filesystem::create_directories(work_ / "out");
     NewJob job;
     job.inputs.scene = {"scene.glb", store_bytes("scene")};

@@ -42,7 +42,11 @@ TEST_F(WorkerLimitsTest, ProcessorTimeEndsAWorkerWithoutAnybodyWatchingTheClock)
 }
 
 TEST_F(WorkerLimitsTest, AFileOfAWorkerHasAnEnd) {
-  static_cast<void>(run_worker(script("truncate -s 100G big; truncate -s 1G small"), {}, StopSignal(), {}));
+  // Limits are set while the worker already starts: this one waits for its own.
+  WorkerStart start =
+      script("until [ \"$(ulimit -f)\" != unlimited ]; do :; done; truncate -s 100G big; truncate -s 1G small");
+  start.cpu_s = 20;
+  static_cast<void>(run_worker(start, {}, StopSignal(), {}));
   EXPECT_LT(std::filesystem::file_size(folder_ / "big"), 8ULL << 30);
   EXPECT_EQ(std::filesystem::file_size(folder_ / "small"), 1ULL << 30);
 }

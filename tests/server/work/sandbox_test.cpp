@@ -55,8 +55,14 @@ class SandboxTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(SandboxTest, AWorkerReadsItsInputsAndWritesItsResults) {
-  EXPECT_EQ(try_open(folder_ / "inputs" / "0", O_RDONLY), 0);
+TEST_F(SandboxTest, AWorkerReadsItsInputsByWhatItOpenedBeforeAndWritesItsResults) {
+  const int input = ::open((folder_ / "inputs" / "0").c_str(), O_RDONLY | O_CLOEXEC);
+  char first = 0;
+  EXPECT_EQ(try_inside([&] { return ::pread(input, &first, 1, 0) == 1 && first == 's' ? 0 : -1; }), 0);
+  EXPECT_EQ(try_open(folder_ / "inputs" / "0", O_RDONLY), EACCES);
+  for (const int flags : {O_RDONLY, O_RDWR})
+    EXPECT_EQ(try_open("/proc/self/fd/" + std::to_string(input), flags), EACCES);
+  ::close(input);
   EXPECT_EQ(try_open(folder_ / "out" / "scene.glb", O_WRONLY | O_CREAT | O_EXCL), 0);
 }
 

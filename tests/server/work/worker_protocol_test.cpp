@@ -29,9 +29,9 @@ TEST(WorkerProtocol, EveryLineComesBackAsItWasSent) {
 }
 
 TEST(WorkerProtocol, AnswersAndOrdersOfPartsComeBack) {
-  const RangeReply reply = parse_reply(reply_json({{1, 2, 3}, "inputs/range.1.2"})).value();
+  const RangeReply reply = parse_reply(reply_json({{1, 2, 3}, "ranges/1"})).value();
   EXPECT_EQ(reply.range, (LoopRange{1, 2, 3}));
-  EXPECT_EQ(reply.file, "inputs/range.1.2");
+  EXPECT_EQ(reply.file, "ranges/1");
   const PartOrder order = parse_part(part_json({{4, 5, 6}, R"({"passes":[]})"})).value();
   EXPECT_EQ(order.range, (LoopRange{4, 5, 6}));
   EXPECT_EQ(order.checkpoint, R"({"passes":[]})");
