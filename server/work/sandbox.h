@@ -1,9 +1,8 @@
 #pragma once
 // A worker locks itself in before it looks at a byte of its input. For good: nothing opens the lock again.
 //
-//   files   Landlock: reads the system's libraries and what others made of its bake (`ranges/`), writes `out/` alone;
-//   its
-//           inputs are descriptors that it opened before
+//   files   Landlock: reads the system's libraries and `ranges/`, what others made of its bake, and writes `out/`
+//           alone; its inputs are descriptors that it opened before
 //   calls   seccomp: no sockets, no other programs, no child processes, no signals to others, no mounts, no tracing
 //
 // The order is fixed: PR_SET_NO_NEW_PRIVS, Landlock, seccomp. Either lock may be missing on a kernel (Landlock needs
