@@ -48,30 +48,28 @@ struct SpawnSettings {
   SpawnSettings& operator=(const SpawnSettings&) = delete;
 };
 
-void set_files(SpawnSettings& settings, const WorkerStart& start, int pipe) {
+bool set_files(SpawnSettings& settings, const WorkerStart& start, int pipe) {
   auto* files = &settings.files;
   const std::string log = start.folder / "worker.log";
-  if (start.input >= 0) {
-    posix_spawn_file_actions_adddup2(files, start.input, 0);
-  } else {
-    posix_spawn_file_actions_addopen(files, 0, "/dev/null", O_RDONLY, 0);
-  }
-  posix_spawn_file_actions_addopen(files, 2, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
-  posix_spawn_file_actions_adddup2(files, 2, 1);
-  posix_spawn_file_actions_adddup2(files, pipe, kWorkerPipe);
-  posix_spawn_file_actions_addclosefrom_np(files, kWorkerPipe + 1);  // whatever else the server has open
-  posix_spawn_file_actions_addchdir_np(files, start.folder.c_str());
+  const int input = start.input >= 0 ? posix_spawn_file_actions_adddup2(files, start.input, 0)
+                                     : posix_spawn_file_actions_addopen(files, 0, "/dev/null", O_RDONLY, 0);
+  return input == 0 &&
+         posix_spawn_file_actions_addopen(files, 2, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600) == 0 &&
+         posix_spawn_file_actions_adddup2(files, 2, 1) == 0 &&
+         posix_spawn_file_actions_adddup2(files, pipe, kWorkerPipe) == 0 &&
+         posix_spawn_file_actions_addclosefrom_np(files, kWorkerPipe + 1) == 0 &&  // whatever else the server has open
+         posix_spawn_file_actions_addchdir_np(files, start.folder.c_str()) == 0;
 }
 
-void set_attributes(SpawnSettings& settings) {
+bool set_attributes(SpawnSettings& settings) {
   sigset_t none, all;
   sigemptyset(&none);
   sigfillset(&all);
-  posix_spawnattr_setsigmask(&settings.attributes, &none);
-  posix_spawnattr_setsigdefault(&settings.attributes, &all);
-  posix_spawnattr_setpgroup(&settings.attributes, 0);
-  posix_spawnattr_setflags(&settings.attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  return posix_spawnattr_setsigmask(&settings.attributes, &none) == 0 &&
+         posix_spawnattr_setsigdefault(&settings.attributes, &all) == 0 &&
+         posix_spawnattr_setpgroup(&settings.attributes, 0) == 0 &&
+         posix_spawnattr_setflags(&settings.attributes,
+                                  POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP) == 0;
 }
 
 /// Few variables and no secrets of the server.
@@ -122,8 +120,7 @@ Result<WorkerProcess> WorkerProcess::start(const WorkerStart& start) {
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return spawn_fault();
   ::fcntl(ends[0], F_SETFL, O_NONBLOCK);
   SpawnSettings settings;
-  set_files(settings, start, ends[1]);
-  set_attributes(settings);
+  const bool set = set_files(settings, start, ends[1]) && set_attributes(settings);
   std::vector<std::string> arguments = start.command;
   if (arguments.empty()) arguments = {"/proc/self/exe", kWorkerWord};
   const std::string program = arguments.front();
@@ -131,10 +128,10 @@ Result<WorkerProcess> WorkerProcess::start(const WorkerStart& start) {
   arguments.push_back(start.folder);
   std::vector<std::string> environment = clean_environment();
   pid_t pid = 0;
-  const int failed = ::posix_spawn(&pid, program.c_str(), &settings.files, &settings.attributes,
-                                   pointers(arguments).data(), pointers(environment).data());
+  const bool started = set && ::posix_spawn(&pid, program.c_str(), &settings.files, &settings.attributes,
+                                            pointers(arguments).data(), pointers(environment).data()) == 0;
   ::close(ends[1]);
-  if (failed != 0) {
+  if (!started) {
     ::close(ends[0]);
     return spawn_fault();
   }
