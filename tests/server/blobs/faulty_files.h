@@ -36,6 +36,27 @@ inline constexpr Blow kBlows[] = {{"kill"}, {"power cut", 0, true}, {"EIO", EIO}
 /// Of all pairs of blows one in `otherwise` is tried; with KILN_SOAK in the environment every one.
 inline int pair_stride(int otherwise) { return std::getenv("KILN_SOAK") != nullptr ? 1 : otherwise; }
 
+/// Which of two blows found a call to strike: a life that ends before has no more of them.
+struct Struck {
+  bool first = true, second = true;
+};
+/// Tries blows at calls i and j of two lives, for all pairs, one in `stride` of the j. `act(first, i, second, j)`
+/// returns Struck; both false ends it. Returns the number of pairs.
+template <class Act>
+int try_pairs(int stride, const Act& act) {
+  int pairs = 0;
+  for (const Blow& first : kBlows) {
+    for (const Blow& second : kBlows) {
+      Struck struck;
+      for (int i = 0; struck.first; ++i) {
+        struck.second = true;
+        for (int j = i % stride; struck.second; j += stride, ++pairs) struck = act(first, i, second, j);
+      }
+    }
+  }
+  return pairs;
+}
+
 /// Works on real files. Calls are numbered from 0.
 class FaultyFiles : public FileLayer {
  public:
