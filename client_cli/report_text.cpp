@@ -125,7 +125,7 @@ std::string certificate_text(std::string_view report) {
   if (lightmap.is_object())
     out += (out.empty() ? "" : "\n") + std::string("of the lightmap, at ") + count(number_of(lightmap, "points")) +
            " points that can be seen: " + error_text(lightmap) + "; its 8-bit image: " + error_text(lightmap["image"]);
-  const std::string reduced = reduction_text(document);
+  std::string reduced = reduction_text(document);
   if (out.empty()) return reduced;
   if (!reduced.empty()) out = reduced + "\n" + out;
   const json levels = document.contains("lightfield") ? list_of(document["lightfield"], "levels") : json::array();
