@@ -90,6 +90,16 @@ std::vector<PartFinish> find_specular_parts(const Scene& scene, bool all) {
   return out;
 }
 
+std::optional<Warning> shown_as_matte(const Scene& scene) {
+  const std::vector<PartFinish> finish = find_specular_parts(scene, false);
+  if (std::ranges::none_of(finish, &PartFinish::specular)) return {};
+  return Warning{"specular_as_matte",
+                 names_of(scene, finish) +
+                     ": smooth or metal, and lit as a matte surface that reflects as much. The steps prt and "
+                     "lightfield show what they mirror.",
+                 ""};
+}
+
 GlossyDecision plan_glossy(const Scene& scene, PrtStep::Glossy asked, int order) {
   using Glossy = PrtStep::Glossy;
   if (asked == Glossy::off) return {{}, "skipped", "turned off by the recipe: every surface is diffuse", {}};

@@ -11,6 +11,7 @@
 // none. `on` shows them as glTF's formula does.
 // Below roughness .4 a lobe keeps more than a third of band 5, the first that five bands leave out: the plan warns.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,9 @@ struct GlossyDecision {
   std::string value, reason;
   std::vector<Warning> warnings;
 };
+
+/// For steps that know diffuse light only: which parts look specular and are lit as matte ones.
+std::optional<Warning> shown_as_matte(const Scene&);
 
 /// `order` is that of the transfer vectors.
 GlossyDecision plan_glossy(const Scene&, PrtStep::Glossy, int order);

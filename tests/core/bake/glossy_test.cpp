@@ -70,6 +70,23 @@ TEST(GlossyPlan, UnlitPartsNeverAreAndATextureCountsWhereItIsSmooth) {
   EXPECT_NEAR(finish.smoothest, 0.2, 1e-6);
 }
 
+TEST(GlossyPlan, StepsOfDiffuseLightNameWhatTheyShowAsMatte) {
+  EXPECT_FALSE(shown_as_matte(scene_with({{1, 1}, {0, 0.5F}})));
+  const auto warning = shown_as_matte(scene_with({{1, 1}, {1, 0.3F}, {0, 0.2F}}));
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->code, "specular_as_matte");
+  EXPECT_TRUE(warning->message.starts_with("'m2' and 1 more")) << warning->message;
+  Threads threads;
+  for (const auto& [step, warns] :
+       {std::pair("radiosity", true), {"transport", true}, {"grid", true}, {"prt", false}}) {
+    const std::string recipe =
+        std::string(R"({"environment":{"builtin":"overcast"},"steps":[{"do":")") + step + "\"}]}";
+    const auto plan = plan_json(finished("column", recipe, kMetalKnot), threads);
+    ASSERT_TRUE(plan) << plan.error().message;
+    EXPECT_EQ(plan->find("specular_as_matte") != std::string::npos, warns) << step;
+  }
+}
+
 TEST(GlossyPlan, SaysWhatItDecidedAndWarnsOfLobesSharperThanItsBands) {
   const auto none = plan_glossy(scene_with({{1, 1}}), PrtStep::Glossy::automatic, 6);
   EXPECT_FALSE(none.plan);
