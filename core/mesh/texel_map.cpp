@@ -137,10 +137,11 @@ TexelParts::TexelParts(const Mesh& mesh, const UvCharts& charts, const TexelMap&
 
 std::vector<TexelPlace> TexelParts::of(std::size_t k, int side) const {
   const auto width = static_cast<std::uint32_t>(map_.side);
-  const Vec2d centre{double(texel_[k] % width), double(texel_[k] / width)};
+  const std::uint32_t column = texel_[k] % width, row = texel_[k] / width;
   std::vector<TexelPlace> out;
   for (int part = 0; part < side * side; ++part) {
-    const Vec2d at = centre + Vec2d{(part % side + 0.5) / side - 0.5, (part / side + 0.5) / side - 0.5};
+    const int i = part % side, j = part / side;
+    const Vec2d at{column + (i + 0.5) / side - 0.5, row + (j + 0.5) / side - 0.5};
     for (const std::uint32_t t : triangles_[k]) {
       const Nearest found = nearest_place(corners_of(mesh_, t, map_.side), at);
       if (!found.inside) continue;
