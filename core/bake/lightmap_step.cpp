@@ -273,10 +273,18 @@ void LightmapStep::choose_places(const Tracer& tracer, Threads& threads) {
       }
     }
   });
+  const auto chart = [&](std::size_t i) { return charts_.of[map_.places[i].triangle]; };
+  std::vector<char> buried(charts_.count, 0), has_parts(charts_.count, 0);
+  for (std::size_t i = 0; i < centre.size(); ++i)
+    if (centre[i] != Enclosure::open) buried[chart(i)] = 1;
+  for (std::size_t k = 0; k < wanted.size(); ++k)
+    if (!found[k].at.empty()) has_parts[chart(wanted[k])] = 1;
   for (std::uint32_t i = 0, k = 0; i < parted.size(); ++i) {
     Found own;
     if (parted[i] != 0) own = std::move(found[k++]);
-    if (own.at.empty() && centre[i] != Enclosure::solid)
+    // Beside a small chart that goes into a solid its own texels say more than the crease at its border.
+    const bool beside = parted[i] != 0 && !map_.places[i].inside && has_parts[chart(i)] != 0 && buried[chart(i)] != 0;
+    if (own.at.empty() && centre[i] != Enclosure::solid && !beside)
       own = {{point_of(map_.places[i])}, {static_cast<char>(centre[i] == Enclosure::backs ? 1 : 0)}};
     if (own.at.empty()) continue;
     places_.insert(places_.end(), own.at.begin(), own.at.end());

@@ -8,7 +8,8 @@
 // Small    Texels of charts that have few, and those whose centre lies inside a solid, show the mean over the parts of
 //          them that can be seen: where a texel is as large as a button, its centre may lie in the cloth below.
 // Filled   Texels inside solids take their light from the chart around them, those of no chart from their neighbours.
-//          A place among the backs of faces, of double-sided ones too, is inside of one where it has hardly any light.
+//          Texels beside a small chart that goes into a solid are filled likewise. A place among the backs of faces, of
+//          double-sided ones too, is inside of one where it has hardly any light.
 // Seams    The two sides of a seam agree (core/mesh/texel_seams.h).
 // Layout   The author's where it is one for the whole scene, else packed anew (core/mesh/uv_charts.h). Instances are
 //          written out and never share texels.
