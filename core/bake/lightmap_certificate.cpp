@@ -19,6 +19,7 @@ namespace {
 struct Probe {
   std::vector<Vec2f> uv;
   std::vector<ReferencePoint> truth;
+  std::vector<char> backs;  // whether it sees nothing but backs: inside a solid where it is dark, too
 };
 
 class Prober {
@@ -27,7 +28,7 @@ class Prober {
       : mesh_(check.decoded.scene.mesh),
         input_(check.truth.scene().mesh),
         nearest_(input_),
-        hidden_(hidden_test(check.truth)) {
+        enclosure_(enclosure_test(check.truth)) {
     for (const std::uint32_t part : mesh_.part) density_.push_back(check.lightmap.parts[part] != 0 ? 1 : 0);
   }
 
@@ -40,7 +41,9 @@ class Prober {
       const Vec3f position = to_float(match_position(input_, *match)), normal = to_float(match_normal(input_, *match));
       Vec3f face = normalized(area_vector(input_, input_.triangles[match->triangle]), normal);
       if (dot(face, normal) < 0) face = -face;
-      if (hidden_({position, normal, position, face})) continue;
+      const Enclosure around = enclosure_({position, normal, position, face});
+      if (around == Enclosure::solid) continue;
+      out.backs.push_back(around == Enclosure::backs ? 1 : 0);
       const Triangle& t = mesh_.triangles[s.triangle];
       out.uv.push_back(mesh_.uv1[t[0]] * (1 - s.u - s.v) + mesh_.uv1[t[1]] * s.u + mesh_.uv1[t[2]] * s.v);
       out.truth.push_back({position, normal, face});
@@ -51,21 +54,41 @@ class Prober {
  private:
   const Mesh &mesh_, &input_;
   ClosestPoint nearest_;
-  HiddenTest hidden_;
+  std::function<Enclosure(const TransferPoint&)> enclosure_;
   std::vector<double> density_;
 };
-
-std::vector<Vec3d> shown(const Lightmap& map, const Probe& probe) {
-  std::vector<Vec3d> out;
-  for (const Vec2f& uv : probe.uv) out.push_back(to_double(map.at(uv)));
-  return out;
-}
 
 /// The job's environment and the scene's lamps together.
 struct Truth {
   std::vector<Vec3d> value, noise;
   std::uint64_t rays = 0;
 };
+
+double mean_size(const std::vector<Vec3d>& values) {
+  double sum = 0;
+  for (const Vec3d& x : values) sum += (std::abs(x.x) + std::abs(x.y) + std::abs(x.z)) / 3;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+/// Leaves out what is inside solids after all.
+void leave_dark_insides(Probe& probe, Truth& truth) {
+  const double dark = kDarkInside * mean_size(truth.value);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < probe.uv.size(); ++i) {
+    if (probe.backs[i] != 0 && mean_size({truth.value[i]}) <= dark) continue;
+    probe.uv[kept] = probe.uv[i], probe.truth[kept] = probe.truth[i], probe.backs[kept] = probe.backs[i];
+    truth.value[kept] = truth.value[i], truth.noise[kept] = truth.noise[i];
+    ++kept;
+  }
+  probe.uv.resize(kept), probe.truth.resize(kept), probe.backs.resize(kept);
+  truth.value.resize(kept), truth.noise.resize(kept);
+}
+
+std::vector<Vec3d> shown(const Lightmap& map, const Probe& probe) {
+  std::vector<Vec3d> out;
+  for (const Vec2f& uv : probe.uv) out.push_back(to_double(map.at(uv)));
+  return out;
+}
 
 Truth truth_at(const LightmapCheck& check, std::span<const ReferencePoint> points, int samples, std::uint64_t seed,
                Threads& threads) {
@@ -100,12 +123,6 @@ void look_again(const LightmapCheck& check, const Probe& probe, const std::vecto
   truth.rays += known.rays;
 }
 
-double mean_size(const std::vector<Vec3d>& values) {
-  double sum = 0;
-  for (const Vec3d& x : values) sum += (std::abs(x.x) + std::abs(x.y) + std::abs(x.z)) / 3;
-  return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
-
 }  // namespace
 
 LightmapCertificate certify_lightmap(const LightmapCheck& check, Threads& threads) {
@@ -113,8 +130,9 @@ LightmapCertificate certify_lightmap(const LightmapCheck& check, Threads& thread
   const std::uint64_t seed = mix64(check.seed ^ 0x6c6d7472757468ULL);
   const Prober prober(check);
 
-  const Probe few = prober.probe(Spending::kFewestPoints, seed);
-  const Truth pilot = truth_at(check, few.truth, Spending::kPilotSamples, mix64(seed), threads);
+  Probe few = prober.probe(Spending::kFewestPoints, seed);
+  Truth pilot = truth_at(check, few.truth, Spending::kPilotSamples, mix64(seed), threads);
+  leave_dark_insides(few, pilot);
   const std::vector<Vec3d> first = shown(check.lightmap, few);
   const ErrorStats known =
       compute_error({first, pilot.value, pilot.noise, few.uv.size()}, {.seed = seed, .resamples = 1});
@@ -122,9 +140,10 @@ LightmapCertificate certify_lightmap(const LightmapCheck& check, Threads& thread
   const Spending spending =
       plan_spending(known, std::max(1.0, static_cast<double>(pilot.rays) / paths), check.bake_rays, false);
 
-  const Probe many = prober.probe(spending.points, seed);
-  const std::vector<Vec3d> values = shown(check.lightmap, many), of_image = shown(check.image, many);
+  Probe many = prober.probe(spending.points, seed);
   Truth truth = truth_at(check, many.truth, spending.samples, seed, threads);
+  leave_dark_insides(many, truth);
+  const std::vector<Vec3d> values = shown(check.lightmap, many), of_image = shown(check.image, many);
   look_again(check, many, values, spending.samples, seed, truth, threads);
   LightmapCertificate out;
   out.points = many.uv.size();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/mesh/topology.h"
 #include "core/prt/hidden.h"
@@ -16,8 +17,12 @@ constexpr double kTexelsAVertex = 4;  // for about the error of the vertices (RE
 constexpr double kPackedFill = 0.7;   // of the picture that packed charts are taken to cover
 constexpr int kSideStep = 64, kLeastSide = 64, kMostSide = 8192;
 constexpr std::size_t kBlock = 256;
-constexpr float kEdge = 0.25F;  // of the brighter of two texels and of the mean: a jump of direct light
-constexpr int kParts = 4;       // along a side of a texel at a jump
+constexpr float kEdge = 0.25F;             // of the brighter of two texels and of the mean: a jump of direct light
+constexpr int kParts = 4;                  // along a side of a texel at a jump
+constexpr int kPartsOfSmall = 2;           // of a texel of a small chart, and of one whose centre is inside a solid
+constexpr std::uint32_t kSmallChart = 64;  // texels: a chart with fewer is small
+
+float largest(const Vec3f& x) { return std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}); }
 
 std::string percent(double share) { return short_text(100 * share) + " %"; }
 
@@ -224,107 +229,174 @@ LightmapStep::LightmapStep(const Scene& scene, const Plan& plan, Threads& thread
     if (charts_.of[t] != kNoChart)
       area_ += triangle_area(mesh, mesh.triangles[t]) * scene.frame.scale * scene.frame.scale;
   }
-  const Tracer tracer(scene, threads);
-  const HiddenTest hidden = hidden_test(tracer);
-  std::vector<TransferPoint> all(map_.places.size());
-  std::vector<char> seen(all.size(), 0);
-  threads.for_blocks(all.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  for (const Part& part : scene.parts) look_.push_back(part_look(scene, part));
+  choose_places(Tracer(scene, threads), threads);
+}
+
+/// Of map_.places: whether the chart has few texels.
+std::vector<char> LightmapStep::in_small_charts() const {
+  std::vector<std::uint32_t> texels(charts_.count, 0);
+  for (const TexelPlace& p : map_.places) texels[charts_.of[p.triangle]] += p.inside ? 1 : 0;
+  std::vector<char> out;
+  for (const TexelPlace& p : map_.places) out.push_back(texels[charts_.of[p.triangle]] < kSmallChart ? 1 : 0);
+  return out;
+}
+
+/// The centre of each texel, or its parts, that are not inside solids.
+void LightmapStep::choose_places(const Tracer& tracer, Threads& threads) {
+  const auto enclosure = enclosure_test(tracer);
+  const auto point_of = [&](const TexelPlace& at) { return place_on(surface_, at.triangle, at.u, at.v); };
+  std::vector<char> parted = in_small_charts();
+  std::vector<Enclosure> centre(map_.places.size());
+  threads.for_blocks(centre.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const TexelPlace& at = map_.places[i];
-      all[i] = place_on(mesh, at.triangle, at.u, at.v);
-      seen[i] = hidden(all[i]) ? 0 : 1;
+      centre[i] = enclosure(point_of(map_.places[i]));
+      if (centre[i] != Enclosure::open) parted[i] = 1;
     }
   });
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (seen[i] == 0) continue;
-    places_.push_back(all[i]);
-    look_.push_back(part_look(scene, scene.parts[mesh.part[map_.places[i].triangle]]));
-    of_map_.push_back(static_cast<std::uint32_t>(i));
+  std::vector<std::uint32_t> wanted;
+  for (std::uint32_t i = 0; i < parted.size(); ++i)
+    if (parted[i] != 0) wanted.push_back(i);
+  const TexelParts parts(surface_, charts_, map_, wanted);
+  struct Found {
+    std::vector<TransferPoint> at;
+    std::vector<char> backs;
+  };
+  std::vector<Found> found(wanted.size());
+  threads.for_blocks(wanted.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      for (const TexelPlace& part : parts.of(k, kPartsOfSmall)) {
+        const TransferPoint p = point_of(part);
+        const Enclosure e = enclosure(p);
+        if (e == Enclosure::solid) continue;
+        found[k].at.push_back(p), found[k].backs.push_back(e == Enclosure::backs ? 1 : 0);
+      }
+    }
+  });
+  const auto chart = [&](std::size_t i) { return charts_.of[map_.places[i].triangle]; };
+  std::vector<char> buried(charts_.count, 0), has_parts(charts_.count, 0);
+  for (std::size_t i = 0; i < centre.size(); ++i)
+    if (centre[i] != Enclosure::open) buried[chart(i)] = 1;
+  for (std::size_t k = 0; k < wanted.size(); ++k)
+    if (!found[k].at.empty()) has_parts[chart(wanted[k])] = 1;
+  for (std::uint32_t i = 0, k = 0; i < parted.size(); ++i) {
+    Found own;
+    if (parted[i] != 0) own = std::move(found[k++]);
+    // Beside a small chart that goes into a solid its own texels say more than the crease at its border.
+    const bool beside = parted[i] != 0 && !map_.places[i].inside && has_parts[chart(i)] != 0 && buried[chart(i)] != 0;
+    if (own.at.empty() && centre[i] != Enclosure::solid && !beside)
+      own = {{point_of(map_.places[i])}, {static_cast<char>(centre[i] == Enclosure::backs ? 1 : 0)}};
+    if (own.at.empty()) continue;
+    places_.insert(places_.end(), own.at.begin(), own.at.end());
+    backs_.insert(backs_.end(), own.backs.begin(), own.backs.end());
+    shown_.push_back(i);
+    end_.push_back(static_cast<std::uint32_t>(places_.size()));
   }
 }
 
-/// Places all over texel `place`, as far as its own triangle reaches.
-void LightmapStep::add_parts(std::size_t place, std::vector<TransferPoint>& out) const {
-  const TexelPlace& at = map_.places[of_map_[place]];
-  std::array<Vec2d, 3> c;  // in texels
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec2f& uv = surface_.uv1[surface_.triangles[at.triangle][k]];
-    c[k] = {double{uv.x} * map_.side, double{uv.y} * map_.side};
-  }
-  const Vec2d e1 = c[1] - c[0], e2 = c[2] - c[0];
-  const double twice = cross(e1, e2);
-  if (twice == 0) return;
-  for (int part = 0; part < kParts * kParts; ++part) {
-    const int column = part % kParts, row = part / kParts;
-    const Vec2d off{(column + 0.5) / kParts - 0.5, (row + 0.5) / kParts - 0.5};
-    const double u = double{at.u} + cross(off, e2) / twice, v = double{at.v} + cross(e1, off) / twice;
-    if (u >= 0 && v >= 0 && u + v <= 1)
-      out.push_back(place_on(surface_, at.triangle, static_cast<float>(u), static_cast<float>(v)));
-  }
-}
-
-std::vector<Vec3f> LightmapStep::softened(const LitPlaces& lit, Threads& threads) const {
-  std::vector<Vec3f> out(lit.direct.begin(), lit.direct.end());
-  const auto largest = [](const Vec3f& x) { return std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}); };
+/// Of each place: whether it sees nothing but backs and has next to no light.
+std::vector<char> LightmapStep::inside_solids(const LitPlaces& lit) const {
   double mean = 0;
-  for (const Vec3f& x : out) mean += double{largest(x)} / static_cast<double>(out.size());
-  const std::vector<char> edge = edges([&](std::size_t a, std::size_t b) {
-    const float apart = largest(lit.direct[a] - lit.direct[b]);
-    return apart > kEdge * std::max({largest(lit.direct[a]), largest(lit.direct[b]), static_cast<float>(mean)});
-  });
-  std::vector<TransferPoint> parts;
-  std::vector<std::uint32_t> of;  // the place of each
-  for (std::size_t i = 0; i < edge.size(); ++i) {
-    if (edge[i] != 0) add_parts(i, parts);
-    of.resize(parts.size(), static_cast<std::uint32_t>(i));
-  }
-  const std::vector<Vec3f> light = lit.direct_at(parts);
-  const HiddenTest hidden = hidden_test(lit.tracer);
-  std::vector<char> seen(parts.size());
-  threads.for_blocks(parts.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) seen[k] = hidden(parts[k]) ? 0 : 1;
-  });
-  for (std::size_t k = 0; k < parts.size();) {
-    const std::uint32_t place = of[k];
+  for (std::size_t i = 0; i < places_.size(); ++i) mean += double{largest(lit.direct[i] + lit.reflected[i])};
+  mean /= static_cast<double>(std::max<std::size_t>(1, places_.size()));
+  std::vector<char> out;
+  for (std::size_t i = 0; i < places_.size(); ++i)
+    out.push_back(backs_[i] != 0 && double{largest(lit.direct[i] + lit.reflected[i])} <= kDarkInside * mean ? 1 : 0);
+  return out;
+}
+
+/// For each texel that is shown, over its places that are not inside solids; 0 where all are.
+std::vector<Vec3f> LightmapStep::means(std::span<const Vec3f> of_places, std::span<const char> inside) const {
+  std::vector<Vec3f> out;
+  for (std::size_t t = 0, i = 0; t < shown_.size(); ++t) {
     Vec3f sum;
     float count = 0;
-    for (; k < parts.size() && of[k] == place; ++k) {
-      if (seen[k] != 0) sum += light[k], count += 1;
+    for (; i < end_[t]; ++i) {
+      if (inside[i] == 0) sum += of_places[i], count += 1;
     }
-    if (count > 0) out[place] = sum / count;
+    out.push_back(count > 0 ? sum / count : Vec3f{});
   }
   return out;
 }
 
-/// Places beside which, in their own chart, one stands that `differs(a, b)` from them.
+/// Texels at jumps of direct light take its mean over their parts.
+void LightmapStep::soften(const LitPlaces& lit, std::vector<Vec3f>& direct, Threads& threads) const {
+  double mean = 0;
+  for (const Vec3f& x : direct) mean += double{largest(x)} / static_cast<double>(direct.size());
+  const std::vector<std::uint32_t> edge = edges([&](std::size_t a, std::size_t b) {
+    const float apart = largest(direct[a] - direct[b]);
+    return apart > kEdge * std::max({largest(direct[a]), largest(direct[b]), static_cast<float>(mean)});
+  });
+  std::vector<std::uint32_t> wanted;
+  for (const std::uint32_t t : edge) wanted.push_back(shown_[t]);
+  const TexelParts texels(surface_, charts_, map_, wanted);
+  std::vector<TransferPoint> parts;
+  std::vector<std::size_t> end;  // of each edge texel
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    for (const TexelPlace& at : texels.of(k, kParts)) parts.push_back(place_on(surface_, at.triangle, at.u, at.v));
+    end.push_back(parts.size());
+  }
+  const std::vector<Vec3f> light = lit.direct_at(parts);
+  const auto enclosure = enclosure_test(lit.tracer);
+  std::vector<Enclosure> around(parts.size());
+  threads.for_blocks(parts.size(), kBlock, [&](std::size_t begin, std::size_t stop) {
+    for (std::size_t k = begin; k < stop; ++k) around[k] = enclosure(parts[k]);
+  });
+  for (std::size_t k = 0, i = 0; k < edge.size(); ++k) {
+    Vec3f sum;
+    float count = 0;
+    for (; i < end[k]; ++i) {
+      if (around[i] == Enclosure::solid || (around[i] == Enclosure::backs && light[i] == Vec3f{})) continue;
+      sum += light[i], count += 1;
+    }
+    if (count > 0) direct[edge[k]] = sum / count;
+  }
+}
+
+/// Texels that are shown, ascending, beside which, in their own chart, one stands that `differs(a, b)` from them.
 template <class Differs>
-std::vector<char> LightmapStep::edges(const Differs& differs) const {
+std::vector<std::uint32_t> LightmapStep::edges(const Differs& differs) const {
   constexpr std::uint32_t kNone = 0xffffffffU;
   const auto width = static_cast<std::size_t>(map_.side);
   std::vector<std::uint32_t> place(width * width, kNone);
-  for (std::size_t i = 0; i < of_map_.size(); ++i) place[map_.places[of_map_[i]].texel] = static_cast<std::uint32_t>(i);
-  const auto chart = [&](std::uint32_t p) { return charts_.of[map_.places[of_map_[p]].triangle]; };
-  std::vector<char> out(of_map_.size(), 0);
+  for (std::size_t i = 0; i < shown_.size(); ++i) place[map_.places[shown_[i]].texel] = static_cast<std::uint32_t>(i);
+  const auto chart = [&](std::uint32_t p) { return charts_.of[map_.places[shown_[p]].triangle]; };
+  std::vector<char> differing(shown_.size(), 0);
   const auto compare = [&](std::uint32_t a, std::uint32_t b) {
-    if (a != kNone && b != kNone && chart(a) == chart(b) && differs(a, b)) out[a] = out[b] = 1;
+    if (a != kNone && b != kNone && chart(a) == chart(b) && differs(a, b)) differing[a] = differing[b] = 1;
   };
   for (std::size_t i = 0; i < place.size(); ++i) {
     if ((i + 1) % width != 0) compare(place[i], place[i + 1]);
     if (i + width < place.size()) compare(place[i], place[i + width]);
   }
+  std::vector<std::uint32_t> out;
+  for (std::uint32_t i = 0; i < differing.size(); ++i)
+    if (differing[i] != 0) out.push_back(i);
   return out;
 }
 
 void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
   const std::size_t count = static_cast<std::size_t>(map_.side) * static_cast<std::size_t>(map_.side);
-  const std::vector<Vec3f> direct = softened(lit, threads);
+  const std::vector<char> inside = inside_solids(lit);
+  std::vector<Vec3f> direct = means(lit.direct, inside);
+  const std::vector<Vec3f> reflected = means(lit.reflected, inside);
+  soften(lit, direct, threads);
   lightmap_.texels.assign(count, {});
-  std::vector<char> known(count, 0);
-  for (std::size_t i = 0; i < direct.size(); ++i) {
-    const std::uint32_t texel = map_.places[of_map_[i]].texel;
-    lightmap_.texels[texel] = direct[i] + lit.reflected[i];
-    known[texel] = 1;
+  std::vector<char> known(count, 0), lit_charts(charts_.count, 0);
+  std::vector<std::uint32_t> solid;
+  for (std::size_t i = 0; i < shown_.size(); ++i) {
+    const TexelPlace& at = map_.places[shown_[i]];
+    if (std::all_of(inside.begin() + (i == 0 ? 0 : end_[i - 1]), inside.begin() + end_[i], std::identity{})) {
+      solid.push_back(shown_[i]);
+      continue;
+    }
+    lightmap_.texels[at.texel] = direct[i] + reflected[i];
+    known[at.texel] = 1, lit_charts[charts_.of[at.triangle]] = 1;
   }
+  for (const std::uint32_t i : solid)  // a chart of which nothing is seen stays black
+    if (lit_charts[charts_.of[map_.places[i].triangle]] == 0) known[map_.places[i].texel] = 1;
+  hidden_ = map_.places.size() - static_cast<std::size_t>(std::ranges::count_if(
+                                     map_.places, [&](const TexelPlace& p) { return known[p.texel] != 0; }));
   fill_texels(map_, charts_, std::move(known), lightmap_.texels);
   stitch_seams(seams_, map_, lightmap_.texels);
 }
@@ -332,8 +404,9 @@ void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
 float LightmapStep::exposure() const {
   constexpr double kPercentile = 0.9;
   std::vector<float> bright;
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    const Vec3f c = look_[i].albedo * lightmap_.texels[map_.places[of_map_[i]].texel] + look_[i].emission;
+  for (const std::uint32_t i : shown_) {
+    const PartLook& look = look_[surface_.part[map_.places[i].triangle]];
+    const Vec3f c = look.albedo * lightmap_.texels[map_.places[i].texel] + look.emission;
     if (const float most = std::max({c.x, c.y, c.z}); most > 0) bright.push_back(most);
   }
   if (bright.empty()) return 1;
@@ -352,8 +425,8 @@ Result<LightmapOutcome> LightmapStep::finish(Bytes& glb, const Job& job, BakeLog
   KILN_TRY(image, read_lightmap(glb));
   KILN_TRY(exact, read_lightmap_exr(out.exr, "lightmap.exr"));
   exact.parts = image.parts;
-  out.texels = places_.size();
-  out.hidden = map_.places.size() - places_.size();
+  out.hidden = hidden_;
+  out.texels = map_.places.size() - hidden_;
   out.seam_places = seams_.size();
   out.texels_per_metre = area_ > 0 ? std::sqrt(static_cast<double>(map_.inside) / area_) : 0;
   if (job.recipe.certificate) {

@@ -5,7 +5,11 @@
 //          as a vertex is: direct light in full, reflected light read from the points that it sees.
 // Edges    Where direct light jumps from one texel to the next, each of the two takes the mean over its own area: a
 //          shadow has a soft step instead of teeth, as bilinear filtering wants it.
+// Small    Texels of charts that have few, and those whose centre lies inside a solid, show the mean over the parts of
+//          them that can be seen: where a texel is as large as a button, its centre may lie in the cloth below.
 // Filled   Texels inside solids take their light from the chart around them, those of no chart from their neighbours.
+//          Texels beside a small chart that goes into a solid are filled likewise. A place among the backs of faces, of
+//          double-sided ones too, is inside of one where it has hardly any light.
 // Seams    The two sides of a seam agree (core/mesh/texel_seams.h).
 // Layout   The author's where it is one for the whole scene, else packed anew (core/mesh/uv_charts.h). Instances are
 //          written out and never share texels.
@@ -62,19 +66,25 @@ class LightmapStep {
   Result<LightmapOutcome> finish(Bytes& glb, const Job&, BakeLog&, Threads&) const;
 
  private:
-  std::vector<Vec3f> softened(const LitPlaces&, Threads&) const;
+  void choose_places(const Tracer&, Threads&);
+  std::vector<char> in_small_charts() const;
+  std::vector<char> inside_solids(const LitPlaces&) const;
+  std::vector<Vec3f> means(std::span<const Vec3f> of_places, std::span<const char> inside) const;
+  void soften(const LitPlaces&, std::vector<Vec3f>& direct, Threads&) const;
   template <class Differs>
-  std::vector<char> edges(const Differs&) const;
-  void add_parts(std::size_t place, std::vector<TransferPoint>&) const;
+  std::vector<std::uint32_t> edges(const Differs&) const;
 
   Mesh surface_;  // of the input
   UvCharts charts_;
   TexelMap map_;
   std::vector<SeamPlace> seams_;
-  std::vector<char> written_;          // parts that have a triangle
-  std::vector<std::uint32_t> of_map_;  // of each place: which of map_.places it is
+  std::vector<char> written_;         // parts that have a triangle
+  std::vector<std::uint32_t> shown_;  // of map_.places, ascending: those that have light of their own
+  std::vector<std::uint32_t> end_;    // of each: its places end there, and begin where those before it end
   std::vector<TransferPoint> places_;
-  std::vector<PartLook> look_;  // of each place
+  std::vector<char> backs_;     // of each place: it sees nothing but backs
+  std::vector<PartLook> look_;  // of each part of the scene
+  std::size_t hidden_ = 0;      // of map_.places, that were filled
   double area_ = 0;             // of what is shown, square metres
   Lightmap lightmap_;
 };

@@ -44,6 +44,29 @@ Nearest nearest_place(const std::array<Vec2d, 3>& c, const Vec2d& p) {
   return best;
 }
 
+/// Corners of a triangle in texels, whose centres are whole numbers.
+std::array<Vec2d, 3> corners_of(const Mesh& mesh, std::uint32_t triangle, int side) {
+  std::array<Vec2d, 3> c;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2f& uv = mesh.uv1[mesh.triangles[triangle][k]];
+    c[k] = {double{uv.x} * side - 0.5, double{uv.y} * side - 0.5};
+  }
+  return c;
+}
+
+/// Calls f(texel) for those of the picture within `margin` of the triangle's box, row by row.
+template <class F>
+void for_box(const std::array<Vec2d, 3>& c, double margin, int side, const F& f) {
+  const auto bound = [&](double x) { return static_cast<int>(std::clamp(x, -1.0, double(side))); };
+  const auto [left, right] = std::minmax({c[0].x, c[1].x, c[2].x});
+  const auto [top, bottom] = std::minmax({c[0].y, c[1].y, c[2].y});
+  const int last_x = std::min(side - 1, bound(std::ceil(right + margin)));
+  const int last_y = std::min(side - 1, bound(std::ceil(bottom + margin)));
+  for (int y = std::max(0, bound(std::floor(top - margin))); y <= last_y; ++y) {
+    for (int x = std::max(0, bound(std::floor(left - margin))); x <= last_x; ++x) f(x, y);
+  }
+}
+
 struct Claim {
   std::uint32_t triangle = kNoChart;
   float u = 0, v = 0, squared = HUGE_VALF;
@@ -70,25 +93,14 @@ TexelMap map_texels(const Mesh& mesh, const UvCharts& charts, int side) {
   EXPECTS(side >= 1 && side <= 32768);
   const auto width = static_cast<std::size_t>(side);
   std::vector<Claim> texels(width * width);
-  const auto bound = [&](double x) { return static_cast<int>(std::clamp(x, -1.0, double(side))); };
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (charts.of[t] == kNoChart) continue;
-    std::array<Vec2d, 3> c;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec2f& uv = mesh.uv1[mesh.triangles[t][k]];
-      c[k] = {double{uv.x} * side - 0.5, double{uv.y} * side - 0.5};
-    }
-    const auto [left, right] = std::minmax({c[0].x, c[1].x, c[2].x});
-    const auto [top, bottom] = std::minmax({c[0].y, c[1].y, c[2].y});
-    const int last_x = std::min(side - 1, bound(std::ceil(right + 1)));
-    const int last_y = std::min(side - 1, bound(std::ceil(bottom + 1)));
-    for (int y = std::max(0, bound(std::floor(top - 1))); y <= last_y; ++y) {
-      for (int x = std::max(0, bound(std::floor(left - 1))); x <= last_x; ++x) {
-        const Nearest found = nearest_place(c, {double(x), double(y)});
-        if (found.squared <= kReach * kReach)
-          claim(found, t, charts, texels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)]);
-      }
-    }
+    const std::array<Vec2d, 3> c = corners_of(mesh, t, side);
+    for_box(c, 1, side, [&](int x, int y) {
+      const Nearest found = nearest_place(c, {double(x), double(y)});
+      if (found.squared <= kReach * kReach)
+        claim(found, t, charts, texels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)]);
+    });
   }
   TexelMap out{.side = side, .places = {}, .inside = 0, .within = 0, .across = 0};
   for (std::size_t i = 0; i < texels.size(); ++i) {
@@ -98,6 +110,44 @@ TexelMap map_texels(const Mesh& mesh, const UvCharts& charts, int side) {
     out.inside += c.how != Claim::outside ? 1 : 0;
     out.within += c.how == Claim::within ? 1 : 0;
     out.across += c.how == Claim::across ? 1 : 0;
+  }
+  return out;
+}
+
+TexelParts::TexelParts(const Mesh& mesh, const UvCharts& charts, const TexelMap& map,
+                       std::span<const std::uint32_t> wanted)
+    : mesh_(mesh), map_(map), triangles_(wanted.size()) {
+  const auto width = static_cast<std::size_t>(map.side);
+  std::vector<std::uint32_t> number(wanted.empty() ? 0 : width * width, kNoChart), chart;
+  for (const std::uint32_t p : wanted) {
+    const TexelPlace& at = map.places[p];
+    number[at.texel] = static_cast<std::uint32_t>(texel_.size());
+    texel_.push_back(at.texel);
+    chart.push_back(charts.of[at.triangle]);
+  }
+  if (wanted.empty()) return;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (charts.of[t] == kNoChart) continue;
+    for_box(corners_of(mesh, t, map.side), 0.5, map.side, [&](int x, int y) {
+      const std::uint32_t k = number[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
+      if (k != kNoChart && chart[k] == charts.of[t]) triangles_[k].push_back(t);
+    });
+  }
+}
+
+std::vector<TexelPlace> TexelParts::of(std::size_t k, int side) const {
+  const auto width = static_cast<std::uint32_t>(map_.side);
+  const std::uint32_t column = texel_[k] % width, row = texel_[k] / width;
+  std::vector<TexelPlace> out;
+  for (int part = 0; part < side * side; ++part) {
+    const int i = part % side, j = part / side;
+    const Vec2d at{column + (i + 0.5) / side - 0.5, row + (j + 0.5) / side - 0.5};
+    for (const std::uint32_t t : triangles_[k]) {
+      const Nearest found = nearest_place(corners_of(mesh_, t, map_.side), at);
+      if (!found.inside) continue;
+      out.push_back({texel_[k], t, static_cast<float>(found.u), static_cast<float>(found.v), true});
+      break;
+    }
   }
   return out;
 }

@@ -33,6 +33,22 @@ struct TexelMap {
 /// Triangles without a chart are not shown. Coordinates beyond the picture are cut off.
 TexelMap map_texels(const Mesh&, const UvCharts&, int side);
 
+/// Which triangles reach into some texels, of the chart that each of these shows.
+class TexelParts {
+ public:
+  /// `wanted`: of map.places, ascending. Keeps references to mesh and map.
+  TexelParts(const Mesh&, const UvCharts&, const TexelMap&, std::span<const std::uint32_t> wanted);
+
+  /// Places in the middle of the side x side parts of texel wanted[k], of those parts whose middle lies in a triangle.
+  std::vector<TexelPlace> of(std::size_t k, int side) const;
+
+ private:
+  const Mesh& mesh_;
+  const TexelMap& map_;
+  std::vector<std::uint32_t> texel_;
+  std::vector<std::vector<std::uint32_t>> triangles_;  // of each
+};
+
 /// The four texels that bilinear filtering reads at uv, and their weights; the border texels are repeated outwards.
 struct Bilinear {
   std::array<std::uint32_t, 4> texel{};

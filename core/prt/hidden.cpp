@@ -13,14 +13,17 @@ namespace {
 constexpr int kDirections = 64;
 constexpr int kBisections = 12;  // the place is found to a 4096th of the edge
 
-/// Whether ray `lane` ends on the back of a single-sided face.
-bool ends_on_back(const Scene& scene, const Hits16& hits, const Rays16& rays, std::size_t lane) {
+/// What ray `lane` says of the place that it comes from: `solid` where it ends on the back of a single-sided face.
+Enclosure verdict_of(const Scene& scene, const Hits16& hits, const Rays16& rays, std::size_t lane) {
   const std::uint32_t triangle = hits.triangle[lane];
-  if (triangle == kNoHit) return false;
-  const auto part = scene.parts[scene.mesh.part[triangle]];
-  if (scene.materials[static_cast<std::size_t>(part.material)].double_sided) return false;
-  return dot(area_vector(scene.mesh, scene.mesh.triangles[triangle]),
-             Vec3f{rays.dx[lane], rays.dy[lane], rays.dz[lane]}) > 0;
+  if (triangle == kNoHit) return Enclosure::open;
+  const Mesh& mesh = scene.mesh;
+  const Triangle& t = mesh.triangles[triangle];
+  const bool both = scene.materials[static_cast<std::size_t>(scene.parts[mesh.part[triangle]].material)].double_sided;
+  const Vec3f way{rays.dx[lane], rays.dy[lane], rays.dz[lane]}, face = area_vector(mesh, t);
+  const bool turned = both && dot(face, mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]]) < 0;
+  if ((dot(face, way) > 0) == turned) return Enclosure::open;
+  return both ? Enclosure::backs : Enclosure::solid;
 }
 
 /// Fibonacci points on the hemisphere over +Z, near enough to uniform.
@@ -34,7 +37,10 @@ std::array<Vec3f, kDirections> hemisphere() {
   return out;
 }
 
-bool is_hidden(const Tracer& tracer, const std::array<Vec3f, kDirections>& directions, const TransferPoint& p) {
+/// The least of what all directions say; it is not looked for beyond what is at most `open_at`.
+Enclosure enclosure(const Tracer& tracer, const std::array<Vec3f, kDirections>& directions, const TransferPoint& p,
+                    Enclosure open_at) {
+  Enclosure out = Enclosure::solid;
   const Vec3f origin = ray_origin(p);
   const Basis<float> basis = basis_around(p.normal);
   Rays16 rays;
@@ -48,10 +54,11 @@ bool is_hidden(const Tracer& tracer, const std::array<Vec3f, kDirections>& direc
     }
     tracer.closest16(rays, hits);
     for (std::size_t lane = 0; lane < kPacket; ++lane) {
-      if (!ends_on_back(tracer.scene(), hits, rays, lane)) return false;
+      out = std::min(out, verdict_of(tracer.scene(), hits, rays, lane));
+      if (out <= open_at) return out;
     }
   }
-  return true;
+  return out;
 }
 
 /// An edge from a seen vertex to a hidden one, on one of its faces.
@@ -117,7 +124,15 @@ std::vector<Candidate> from_crossings(const Mesh& mesh, const std::vector<bool>&
 }  // namespace
 
 HiddenTest hidden_test(const Tracer& tracer) {
-  return [&tracer, directions = hemisphere()](const TransferPoint& p) { return is_hidden(tracer, directions, p); };
+  return [&tracer, directions = hemisphere()](const TransferPoint& p) {
+    return enclosure(tracer, directions, p, Enclosure::backs) == Enclosure::solid;
+  };
+}
+
+std::function<Enclosure(const TransferPoint&)> enclosure_test(const Tracer& tracer) {
+  return [&tracer, directions = hemisphere()](const TransferPoint& p) {
+    return enclosure(tracer, directions, p, Enclosure::open);
+  };
 }
 
 std::vector<StandIn> find_stand_ins(const Mesh& mesh, const std::vector<bool>& dark, const HiddenTest& test,

@@ -27,6 +27,13 @@ using HiddenTest = std::function<bool(const TransferPoint&)>;
 /// Keeps a reference to the tracer.
 HiddenTest hidden_test(const Tracer&);
 
+/// What those directions meet: something else too, only backs, or only backs of single-sided faces. Among the backs of
+/// double-sided faces (against their vertex normals) a place is inside a solid where it has hardly any light either:
+/// rooms show their fronts to those inside.
+inline constexpr double kDarkInside = 1e-3;  // of the mean light
+enum class Enclosure : std::uint8_t { open, backs, solid };
+std::function<Enclosure(const TransferPoint&)> enclosure_test(const Tracer&);
+
 /// Where the light of a vertex is taken instead.
 struct StandIn {
   std::uint32_t vertex = 0;

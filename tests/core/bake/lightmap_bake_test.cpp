@@ -255,6 +255,107 @@ TEST(LightmapBake, OfAnEdgeOfShadowIsTheShareOfEachTexelThatIsLit) {
   EXPECT_GT(edge, 30);
 }
 
+/// A box that is seen from outside: 24 corners with their normals.
+struct Block {
+  std::vector<float> position, normal;
+  std::vector<std::uint32_t> index;
+
+  Block(const std::array<float, 3>& low, const std::array<float, 3>& high) {
+    for (std::size_t wall = 0; wall < 6; ++wall) {
+      const std::size_t axis = wall / 2;
+      const bool top = wall % 2 == 1;
+      const auto first = static_cast<std::uint32_t>(position.size() / 3);
+      for (const auto& [u, v] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+        std::array<float, 3> p{}, n{};
+        p[axis] = top ? high[axis] : low[axis], n[axis] = top ? 1.0F : -1.0F;
+        p[(axis + 1) % 3] = u != 0 ? high[(axis + 1) % 3] : low[(axis + 1) % 3];
+        p[(axis + 2) % 3] = v != 0 ? high[(axis + 2) % 3] : low[(axis + 2) % 3];
+        position.insert(position.end(), p.begin(), p.end());
+        normal.insert(normal.end(), n.begin(), n.end());
+      }
+      for (const std::uint32_t k : top ? std::array{0U, 1U, 2U, 0U, 2U, 3U} : std::array{0U, 2U, 1U, 0U, 3U, 2U})
+        index.push_back(first + k);
+    }
+  }
+};
+
+/// A square with coordinates, black like the block beside it, and a sun of 3 W/m^2 turned by a quaternion.
+struct Square {
+  std::vector<float> corners, normal, uv;
+};
+Bytes square_and_block(const Square& square, const Block& block, bool double_sided, const std::string& turn) {
+  test::Sample sample;
+  std::vector<float> normals;
+  for (int k = 0; k < 4; ++k) normals.insert(normals.end(), square.normal.begin(), square.normal.end());
+  const auto primitive = [&](const std::vector<float>& p, const std::vector<float>& n,
+                             const std::vector<std::uint32_t>& index, const std::string& more) {
+    const std::string positions = std::to_string(sample.positions(p)), all = std::to_string(sample.normals(n));
+    return R"({"attributes":{"POSITION":)" + positions + R"(,"NORMAL":)" + all + more + R"(},"material":0,"indices":)" +
+           std::to_string(sample.indices(index)) + "}";
+  };
+  const std::string on = R"(,"TEXCOORD_1":)" + std::to_string(sample.accessor(square.uv, 5126, "VEC2", 4));
+  const std::string shown = primitive(square.corners, normals, {0, 1, 2, 0, 2, 3}, on),
+                    beside = primitive(block.position, block.normal, block.index, "");
+  return sample.glb(R"("meshes":[{"primitives":[)" + shown + "," + beside + R"(]}],"materials":[{"doubleSided":)" +
+                    (double_sided ? "true" : "false") +
+                    R"(,"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0}}],)"
+                    R"("nodes":[{"mesh":0},{"rotation":)" +
+                    turn +
+                    R"(,"extensions":{"KHR_lights_punctual":{"light":0}}}],)"
+                    R"("scenes":[{"nodes":[0,1]}],"scene":0,"extensionsUsed":["KHR_lights_punctual"],)"
+                    R"("extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","intensity":3}]}})");
+}
+
+/// The lightmap of such a scene.
+Lightmap lightmap_of(Bytes scene, int side, Threads& threads) {
+  const std::string recipe = R"({"steps":[{"do":"radiosity","deliver":["lightmap"],"lightmap":{"size":)" +
+                             std::to_string(side) + R"(}}],"quality":"draft"})";
+  const auto output = bake(input_of(std::move(scene), recipe), {}, threads);
+  EXPECT_TRUE(output) << output.error().message;
+  if (!output) return {};
+  EXPECT_LT(report_of(*output)["lightmap"]["certificate"]["relrmse"].get<double>(), 0.01);
+  return *read_lightmap_exr(file(*output, "lightmap.exr"), "lightmap.exr");
+}
+
+/// Under a sun that shines straight down a floor is lit up to the foot of a box. What lies below the box is dark, even
+/// where its faces are double-sided, and filtering would carry the dark out.
+TEST(LightmapBake, AFloorIsLitUpToTheFootOfABox) {
+  Threads threads;
+  const Square floor{
+      {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1}, {0, 1, 0}, {0.1F, 0.9F, 0.9F, 0.9F, 0.9F, 0.1F, 0.1F, 0.1F}};
+  const Block box({-0.37F, 0, -0.29F}, {0.33F, 0.5F, 0.31F});
+  for (const bool double_sided : {false, true}) {
+    const Lightmap map =
+        lightmap_of(square_and_block(floor, box, double_sided, "[-0.70710678,0,0,0.70710678]"), 40, threads);
+    ASSERT_EQ(map.texels.size(), 1600U);
+    const float full = 3 / std::numbers::pi_v<float>;
+    for (int k = 0; k < 100 * 100; ++k) {
+      const float x = -0.995F + 0.0199F * static_cast<float>(k % 100),
+                  z = -0.995F + 0.0199F * static_cast<float>(k / 100);
+      if (x > -0.38F && x < 0.34F && z > -0.3F && z < 0.32F) continue;  // below it, and a hundredth around it
+      // Half floats of the EXR, and the light of parts that touch the box.
+      EXPECT_NEAR(map.at({0.5F + 0.4F * x, 0.5F + 0.4F * z}).x, full, 2e-3F * full) << x << " " << z;
+    }
+  }
+}
+
+/// A strip of three by three texels stands in a block up to less than half of its highest texels, as a button in cloth.
+TEST(LightmapBake, ATexelWhoseCentreIsBuriedShowsItsPartThatIsSeen) {
+  Threads threads;
+  const float low = 8.0F / 32, high = 11.0F / 32;
+  const Square strip{{0, 0.08F, 0.3F, 0, 0.08F, -0.3F, 0, -0.52F, -0.3F, 0, -0.52F, 0.3F},
+                     {1, 0, 0},
+                     {low, low, high, low, high, high, low, high}};
+  Square front = strip;  // wound so that its front looks along +x
+  std::swap_ranges(front.corners.begin() + 3, front.corners.begin() + 6, front.corners.begin() + 9);
+  std::swap_ranges(front.uv.begin() + 2, front.uv.begin() + 4, front.uv.begin() + 6);
+  const Block block({-1, -1, -1}, {1, 0, 1});
+  const Lightmap map = lightmap_of(square_and_block(front, block, false, "[0,0.70710678,0,0.70710678]"), 32, threads);
+  ASSERT_EQ(map.texels.size(), 1024U);
+  for (int column = 8; column < 11; ++column)
+    EXPECT_NEAR(map.texels[8 * 32 + static_cast<std::size_t>(column)].x, 3 / std::numbers::pi, 2e-3) << column;
+}
+
 TEST(LightmapBake, AfterReduceIsRefusedByItsOwnStep) {
   Threads threads;
   const auto refused = bake(

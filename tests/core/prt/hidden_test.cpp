@@ -46,6 +46,19 @@ TEST(Hidden, TheInsideOfDoubleSidedFacesIsARoom) {
   EXPECT_FALSE(hidden_test(tracer)(floor_point(0.03F, -0.06F)));
 }
 
+TEST(Hidden, OfDoubleSidedFacesTheInsideIsAmongBacksAndARoomIsNot) {
+  Threads threads(2);
+  const Scene scene = box_on_floor(4, true);
+  const Tracer tracer(scene, threads);
+  EXPECT_EQ(enclosure_test(tracer)(floor_point(0.03F, -0.06F)), Enclosure::backs);
+  EXPECT_EQ(enclosure_test(tracer)(floor_point(0.4F, 0.4F)), Enclosure::open);
+  Scene room = testing::empty_scene();
+  const std::uint32_t walls = testing::add_part(room, {0.8F, 0.8F, 0.8F}, true);
+  testing::add_box(room, {-0.5F, 0, -0.5F}, {0.5F, 1, 0.5F}, 2, true, walls);
+  const Tracer inside(room, threads);
+  EXPECT_EQ(enclosure_test(inside)(floor_point(0.03F, -0.06F)), Enclosure::open);
+}
+
 TEST(Hidden, TheInsideOfARoomThatFacesInIsSeen) {
   Threads threads(2);
   Scene scene = testing::empty_scene();

@@ -18,6 +18,7 @@ export class LampView {
   private readonly box = new Box3();
   private readonly place = new Vector3();
   private readonly uniforms;
+  private asking = false; // the GPU has not yet said what the lamp reaches
   private power = 0; // W/sr at 0 stops; 0: not yet chosen
   private last: Promise<void> = Promise.resolve();
   private readonly unsubscribe: () => void;
@@ -97,7 +98,7 @@ export class LampView {
     if (!lampAt && this.home) this.place.set(...this.home);
     else this.place.set(...(lampAt ?? ([0, 0, 0] as const))).multiply(half).add(middle);
     this.ball?.position.copy(this.place);
-    this.shadow.moveTo(this.place);
+    if (!this.asking) this.shadow.moveTo(this.place); // else the next answer's: cubes do not queue up
     this.uniforms.lampIntensity.value.setScalar(this.power * 2 ** lampPower);
     this.viewer.stage.requestDraw();
   }
@@ -106,7 +107,9 @@ export class LampView {
     const start = performance.now();
     const { lampPower, lampBaked } = this.viewer.state.get();
     const place = this.place.clone();
-    const seen = await this.shadow.seen();
+    if (!place.equals(this.shadow.place)) this.shadow.moveTo(place);
+    this.asking = true;
+    const seen = await this.shadow.seen().finally(() => (this.asking = false));
     if (this.power === 0) this.choosePower(place, seen);
     const { matrixWorld } = this.viewer.model.parts[0].mesh;
     const size = new Vector3().setFromMatrixScale(matrixWorld).x;

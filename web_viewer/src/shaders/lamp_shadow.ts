@@ -91,8 +91,7 @@ void main() { gl_FragColor = vec4(length(vPlace - lampPlace)); }`,
     });
     for (const { geometry, matrixWorld } of meshes) {
       const caster = new Mesh(geometry, this.material);
-      caster.matrixAutoUpdate = false;
-      caster.frustumCulled = false;
+      caster.matrixAutoUpdate = false; // each is drawn on the faces that it may be seen on
       caster.matrix.copy(matrixWorld);
       this.scene.add(caster);
     }
@@ -144,9 +143,14 @@ void main() {
     return { lampDistance: { value: this.cube.texture }, lampPlace: this.material.uniforms.lampPlace as { value: Vector3 } };
   }
 
+  /// Where the cube was drawn.
+  get place(): Vector3 {
+    return this.material.uniforms.lampPlace.value as Vector3;
+  }
+
   /// Draws the cube anew.
   moveTo(place: Vector3): void {
-    (this.material.uniforms.lampPlace.value as Vector3).copy(place);
+    this.place.copy(place);
     this.camera.position.copy(place);
     this.sky.position.copy(place);
     this.sky.updateMatrix();

@@ -1,0 +1,5 @@
+if(TARGET kiln_bake AND TARGET kiln_client)
+  add_executable(kiln_view_paths view_paths.cpp)
+  kiln_flags(kiln_view_paths)
+  target_link_libraries(kiln_view_paths PRIVATE kiln_client kiln_bake)
+endif()
