@@ -19,7 +19,6 @@ namespace {
 struct Probe {
   std::vector<Vec2f> uv;
   std::vector<ReferencePoint> truth;
-  std::vector<char> backs;  // whether it sees nothing but backs: inside a solid where it is dark, too
 };
 
 class Prober {
@@ -28,7 +27,7 @@ class Prober {
       : mesh_(check.decoded.scene.mesh),
         input_(check.truth.scene().mesh),
         nearest_(input_),
-        enclosure_(enclosure_test(check.truth)) {
+        hidden_(hidden_test(check.truth)) {
     for (const std::uint32_t part : mesh_.part) density_.push_back(check.lightmap.parts[part] != 0 ? 1 : 0);
   }
 
@@ -41,9 +40,7 @@ class Prober {
       const Vec3f position = to_float(match_position(input_, *match)), normal = to_float(match_normal(input_, *match));
       Vec3f face = normalized(area_vector(input_, input_.triangles[match->triangle]), normal);
       if (dot(face, normal) < 0) face = -face;
-      const Enclosure around = enclosure_({position, normal, position, face});
-      if (around == Enclosure::solid) continue;
-      out.backs.push_back(around == Enclosure::backs ? 1 : 0);
+      if (hidden_({position, normal, position, face})) continue;
       const Triangle& t = mesh_.triangles[s.triangle];
       out.uv.push_back(mesh_.uv1[t[0]] * (1 - s.u - s.v) + mesh_.uv1[t[1]] * s.u + mesh_.uv1[t[2]] * s.v);
       out.truth.push_back({position, normal, face});
@@ -54,7 +51,7 @@ class Prober {
  private:
   const Mesh &mesh_, &input_;
   ClosestPoint nearest_;
-  std::function<Enclosure(const TransferPoint&)> enclosure_;
+  HiddenTest hidden_;
   std::vector<double> density_;
 };
 
@@ -68,20 +65,6 @@ double mean_size(const std::vector<Vec3d>& values) {
   double sum = 0;
   for (const Vec3d& x : values) sum += (std::abs(x.x) + std::abs(x.y) + std::abs(x.z)) / 3;
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
-
-/// Leaves out what is inside solids after all.
-void leave_dark_insides(Probe& probe, Truth& truth) {
-  const double dark = kDarkInside * mean_size(truth.value);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < probe.uv.size(); ++i) {
-    if (probe.backs[i] != 0 && mean_size({truth.value[i]}) <= dark) continue;
-    probe.uv[kept] = probe.uv[i], probe.truth[kept] = probe.truth[i], probe.backs[kept] = probe.backs[i];
-    truth.value[kept] = truth.value[i], truth.noise[kept] = truth.noise[i];
-    ++kept;
-  }
-  probe.uv.resize(kept), probe.truth.resize(kept), probe.backs.resize(kept);
-  truth.value.resize(kept), truth.noise.resize(kept);
 }
 
 std::vector<Vec3d> shown(const Lightmap& map, const Probe& probe) {
@@ -130,9 +113,8 @@ LightmapCertificate certify_lightmap(const LightmapCheck& check, Threads& thread
   const std::uint64_t seed = mix64(check.seed ^ 0x6c6d7472757468ULL);
   const Prober prober(check);
 
-  Probe few = prober.probe(Spending::kFewestPoints, seed);
-  Truth pilot = truth_at(check, few.truth, Spending::kPilotSamples, mix64(seed), threads);
-  leave_dark_insides(few, pilot);
+  const Probe few = prober.probe(Spending::kFewestPoints, seed);
+  const Truth pilot = truth_at(check, few.truth, Spending::kPilotSamples, mix64(seed), threads);
   const std::vector<Vec3d> first = shown(check.lightmap, few);
   const ErrorStats known =
       compute_error({first, pilot.value, pilot.noise, few.uv.size()}, {.seed = seed, .resamples = 1});
@@ -140,9 +122,8 @@ LightmapCertificate certify_lightmap(const LightmapCheck& check, Threads& thread
   const Spending spending =
       plan_spending(known, std::max(1.0, static_cast<double>(pilot.rays) / paths), check.bake_rays, false);
 
-  Probe many = prober.probe(spending.points, seed);
+  const Probe many = prober.probe(spending.points, seed);
   Truth truth = truth_at(check, many.truth, spending.samples, seed, threads);
-  leave_dark_insides(many, truth);
   const std::vector<Vec3d> values = shown(check.lightmap, many), of_image = shown(check.image, many);
   look_again(check, many, values, spending.samples, seed, truth, threads);
   LightmapCertificate out;

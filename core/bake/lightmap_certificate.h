@@ -3,7 +3,7 @@
 // the path-traced reference of the same light.
 //
 // Points   area-uniform on the parts that the lightmap shows, each matched with the nearest place of the true surface;
-//          those inside solids, which nobody sees, are left out (dark ones among backs, too: core/prt/hidden.h)
+//          those inside solids, which nobody sees, are left out
 // Repeat   same numbers for any thread count.   Never changes the lightmap
 
 #include <cstdint>

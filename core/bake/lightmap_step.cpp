@@ -382,7 +382,7 @@ void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
   const std::vector<Vec3f> reflected = means(lit.reflected, inside);
   soften(lit, direct, threads);
   lightmap_.texels.assign(count, {});
-  std::vector<char> known(count, 0), lit_charts(charts_.count, 0);
+  std::vector<char> known(count, 0);
   std::vector<std::uint32_t> solid;
   for (std::size_t i = 0; i < shown_.size(); ++i) {
     const TexelPlace& at = map_.places[shown_[i]];
@@ -391,14 +391,39 @@ void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
       continue;
     }
     lightmap_.texels[at.texel] = direct[i] + reflected[i];
-    known[at.texel] = 1, lit_charts[charts_.of[at.triangle]] = 1;
+    known[at.texel] = 1;
   }
-  for (const std::uint32_t i : solid)  // a chart of which nothing is seen stays black
-    if (lit_charts[charts_.of[map_.places[i].triangle]] == 0) known[map_.places[i].texel] = 1;
+  for (const std::uint32_t texel : out_of_reach(solid, known)) known[texel] = 1;
   hidden_ = map_.places.size() - static_cast<std::size_t>(std::ranges::count_if(
                                      map_.places, [&](const TexelPlace& p) { return known[p.texel] != 0; }));
   fill_texels(map_, charts_, std::move(known), lightmap_.texels);
   stitch_seams(seams_, map_, lightmap_.texels);
+}
+
+/// Texels of `solid` that no known texel of their chart touches, so that filtering does not read them with one: they
+/// stay black, since a dark room may look like that too.
+std::vector<std::uint32_t> LightmapStep::out_of_reach(std::span<const std::uint32_t> solid,
+                                                      std::span<const char> known) const {
+  const int side = map_.side;
+  std::vector<std::uint32_t> chart(known.size(), kNoChart);
+  for (const TexelPlace& p : map_.places)
+    if (known[p.texel] != 0) chart[p.texel] = charts_.of[p.triangle];
+  std::vector<std::uint32_t> out;
+  for (const std::uint32_t i : solid) {
+    const std::uint32_t own = charts_.of[map_.places[i].triangle];
+    const std::uint32_t texel = map_.places[i].texel;
+    const int x = static_cast<int>(texel) % side, y = static_cast<int>(texel) / side;
+    bool read = false;
+    for (int row = std::max(0, y - 1); row <= std::min(side - 1, y + 1); ++row) {
+      for (int column = std::max(0, x - 1); column <= std::min(side - 1, x + 1); ++column)
+        read =
+            read ||
+            chart[static_cast<std::size_t>(row) * static_cast<std::size_t>(side) + static_cast<std::size_t>(column)] ==
+                own;
+    }
+    if (!read) out.push_back(texel);
+  }
+  return out;
 }
 
 float LightmapStep::exposure() const {

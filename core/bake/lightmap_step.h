@@ -9,7 +9,8 @@
 //          them that can be seen: where a texel is as large as a button, its centre may lie in the cloth below.
 // Filled   Texels inside solids take their light from the chart around them, those of no chart from their neighbours.
 //          Texels beside a small chart that goes into a solid are filled likewise. A place among the backs of faces, of
-//          double-sided ones too, is inside of one where it has hardly any light.
+//          double-sided ones too, is inside of one where it has hardly any light: of those only texels beside lit ones
+//          are filled, which filtering reads with them; the rest stays dark, as a room of such faces would be.
 // Seams    The two sides of a seam agree (core/mesh/texel_seams.h).
 // Layout   The author's where it is one for the whole scene, else packed anew (core/mesh/uv_charts.h). Instances are
 //          written out and never share texels.
@@ -70,6 +71,7 @@ class LightmapStep {
   std::vector<char> in_small_charts() const;
   std::vector<char> inside_solids(const LitPlaces&) const;
   std::vector<Vec3f> means(std::span<const Vec3f> of_places, std::span<const char> inside) const;
+  std::vector<std::uint32_t> out_of_reach(std::span<const std::uint32_t> solid, std::span<const char> known) const;
   void soften(const LitPlaces&, std::vector<Vec3f>& direct, Threads&) const;
   template <class Differs>
   std::vector<std::uint32_t> edges(const Differs&) const;
