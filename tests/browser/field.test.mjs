@@ -501,6 +501,72 @@ test('a level is as coarse as its size on the screen allows, and none flickers',
     await shows(0);
   }));
 
+/// Bytes of RGBA of a square in the middle of the picture; of the plain one `times` as large, if asked.
+const middle = (page, side, fine, times = 1) =>
+  page.evaluate(
+    ({ side, fine, times }) => {
+      const { stage } = window.kilnViewer;
+      const gl = stage.renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const [x, y] = [width, height].map((all) => (all - side) >> 1);
+      stage.fine = fine;
+      if (times > 1) stage.camera.setViewOffset(times * width, times * height, times * x, times * (height - y - side), width, height);
+      stage.drawNow();
+      stage.camera.clearViewOffset();
+      const pixels = new Uint8Array(4 * (times * side) ** 2);
+      const [left, low] = times > 1 ? [0, height - times * side] : [x, y];
+      gl.readPixels(left, low, times * side, times * side, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return [...pixels];
+    },
+    { side, fine, times },
+  );
+const decode = (byte) => (byte <= 10 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
+const rootMeanSquare = (a, b) => Math.sqrt(a.reduce((sum, x, i) => sum + (x - b[i]) ** 2, 0) / a.length);
+
+test('a pixel of a small model is the mean of many places within it', () =>
+  withApart(skyMock, 'background=off', async (page) => {
+    const across = await page.evaluate(() => {
+      const { stage } = window.kilnViewer;
+      for (let d = 12, i = 0; i < 30; ++i, d *= stage.pixelsAcross / 50) stage.pose = [0.4 * d, 0.5 * d, 0.77 * d, 0, 0, 0];
+      return stage.pixelsAcross;
+    });
+    assert.ok(Math.abs(across - 50) < 0.01);
+    const [side, times] = [56, 8]; // 384 / 50, and no less
+    const mean = new Float64Array(4 * side * side);
+    (await middle(page, side, false, times)).forEach((byte, i) => {
+      const [x, y] = [Math.floor(i / 4) % (times * side), Math.floor(i / (4 * times * side))];
+      mean[4 * (Math.floor(y / times) * side + Math.floor(x / times)) + (i % 4)] += decode(byte) / times ** 2;
+    });
+    const expected = [...mean].map((x) => 255 * encode(x));
+    const [off, before] = [rootMeanSquare(await middle(page, side, true), expected), rootMeanSquare(await middle(page, side, false), expected)];
+    assert.ok(off < 1 && before > 3 * off, `${off} off where one sample a pixel is ${before}`);
+  }));
+
+test('the square around a small model has the same sky behind it', () =>
+  withApart(skyMock, 'background=sky', async (page) => {
+    await page.evaluate(() => (window.kilnViewer.stage.pose = [20, 10, 30, 0, 0, 0]));
+    const [fine, once] = [await middle(page, 150, true), await middle(page, 150, false)];
+    await page.evaluate(() => (window.kilnViewer.model.root.visible = false));
+    const [sky, alone] = [await middle(page, 150, true), await middle(page, 150, false)];
+    const all = [...Array(150 * 150).keys()];
+    const [apart, model] = [rootMeanSquare(sky, alone, all), rootMeanSquare(once, alone, all)];
+    assert.ok(apart < 1 && model > 5 * apart, `${apart} and ${model} of 255`);
+  }));
+
+test('a model that is large has one sample a pixel, as has what is no light field', () =>
+  withField('background=off', async (page) => {
+    const same = async () => {
+      const [fine, plain] = [await middle(page, 64, true), await middle(page, 64, false)];
+      return fine.every((byte, i) => byte === plain[i]);
+    };
+    assert.ok(await same());
+    assert.equal(await page.evaluate(() => window.kilnViewer.surfaces.stage.fine), false); // as the last call left it
+    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'vertices' }));
+    await until(page, () => window.kilnViewer.stage.fine);
+    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'light' }));
+    await until(page, () => !window.kilnViewer.stage.fine);
+  }));
+
 test('the panel tells degree, bytes, and what the report certifies', () =>
   withField('', async (page) => {
     const rows = await page.locator('.levels tbody tr').allInnerTexts();
