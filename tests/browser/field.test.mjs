@@ -189,7 +189,7 @@ test('of components mean and weighted rows are added', () => {
 });
 
 const kFaults = {
-  version: (e) => (e.version = 3),
+  version: (e) => (e.version = 4),
   basis: (e) => (e.condonShortley = true),
   reflected: (e) => delete e.reflected,
   degree: (e) => (e.degree = 9),
@@ -388,6 +388,37 @@ for (const what of ['the sky', 'the sky and lamps'])
       const { seen, exposure } = await look(page, kPoses[0]);
       for (const one of seen) near(one.colour, display(between(one), exposure), kSkySteps);
     }));
+
+/// The file with the sky apart, as if its surfaces glowed and the field left that to them.
+function glowing() {
+  const { json, binary } = glbJson(skyFile);
+  Object.assign(json.extensions.KILN_light_field, { version: 3, emissionApart: true });
+  for (const { extensions } of json.meshes[0].primitives) extensions.KILN_radiance_transfer.emission = [0.4, 0.1, 0.2];
+  const text = Buffer.from(JSON.stringify(json));
+  const padded = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]);
+  const chunk = (kind, bytes) => Buffer.concat([Buffer.from(Uint32Array.of(bytes.length, kind).buffer), bytes]);
+  const body = Buffer.concat([chunk(0x4e4f534a, padded), chunk(0x004e4942, binary)]);
+  return Buffer.concat([Buffer.from(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), body]);
+}
+
+test('emission that the field leaves to its surfaces is added to what is seen', async () => {
+  const glowMock = await startMock({ files: { 'scene.glb': glowing() } });
+  try {
+    const seenOf = (mock) => {
+      let found;
+      return withApart(mock, 'tone=none&ev=-2&background=off', async (page) => {
+        found = await look(page, kPoses[0]);
+        for (const { colour, expected } of found.seen) near(colour, display(expected, found.exposure), kSkySteps);
+      }).then(() => found.seen);
+    };
+    const [dark, bright] = [await seenOf(skyMock), await seenOf(glowMock)];
+    bright.forEach(({ expected }, i) =>
+      expected.forEach((x, c) => assert.ok(Math.abs(x - dark[i].expected[c] - [0.4, 0.1, 0.2][c]) < 1e-9)),
+    );
+  } finally {
+    await glowMock.close();
+  }
+});
 
 test('a progressive mesh at its finest mirrors the lamps as the file itself does', () =>
   withApart(lampMock, 'tone=none&ev=-2&background=off', async (page) => {
