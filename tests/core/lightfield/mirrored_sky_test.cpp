@@ -8,6 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/lightfield/seen.h"
+#include "core/prt/lobe_table.h"
 #include "core/trace/ggx.h"
 
 namespace kiln {
