@@ -215,7 +215,7 @@ void read_lamps(const json& root, const Fields& extension, BakedHeader& out, Fin
 void read_field(const json& root, BakedHeader& out, Findings& findings) {
   if (!at(root, kFieldPlace).is_object()) return;
   const Fields extension(at(root, kFieldPlace), kFieldPlace, findings);
-  check_version(extension, 1, 2, findings);
+  check_version(extension, 1, 3, findings);
   check_basis(extension, findings);
   if (!extension.flag("reflected", false))
     findings.fail("not_a_baked_scene", "Radiance functions must be reflected.", extension.pointer("reflected"));
@@ -228,6 +228,7 @@ void read_field(const json& root, BakedHeader& out, Findings& findings) {
   out.field_form = read_form(root, extension, out.field_shape, field_name, out.field_view, findings);
   read_sky(root, extension, out, findings);
   read_lamps(root, extension, out, findings);
+  out.emission_apart = extension.flag("emissionApart", false);
 }
 
 /// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.

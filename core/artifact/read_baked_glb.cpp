@@ -308,7 +308,8 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
                .visibility = std::move(field.visibility.coefficients),
                .sky = {},
                .lamps = file.header.lamps,
-               .lamp_visibility = std::move(field.lamps.coefficients)};
+               .lamp_visibility = std::move(field.lamps.coefficients),
+               .emission_apart = file.header.emission_apart};
   if (file.header.sky) {
     out.field.sky = file.header.sky->mean;
     out.field.sky_slope = static_cast<float>(file.header.sky->slope);

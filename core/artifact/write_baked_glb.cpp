@@ -14,6 +14,7 @@
 #include "core/artifact/png.h"
 #include "core/artifact/sky_levels.h"
 #include "core/base/expects.h"
+#include "core/prt/lobe_table.h"
 
 namespace kiln {
 namespace {
@@ -195,7 +196,7 @@ class Writer {
     if (!field_ || !field_->visibility()) return;
     sky_ = pack_sky(baked_.sky);
     sky_view_ = add_view({reinterpret_cast<const std::uint8_t*>(sky_.texels.data()), sky_.texels.size() * 4});
-    sky_lobes_ = add_floats(make_lobe_table(1).numbers);
+    sky_lobes_ = add_floats(albedo_table().numbers);
   }
 
   json sky_extension() const {
@@ -265,7 +266,10 @@ class Writer {
   }
 
   json field_extension() const {
-    json out = {{"version", field_->lamps() ? 2 : 1},
+    const bool emission = baked_.field.emission_apart;
+    json out = {{"version", emission          ? 3
+                            : field_->lamps() ? 2
+                                              : 1},
                 {"basis", "real-sh"},
                 {"condonShortley", false},
                 {"frame", "world, +Y up"},
@@ -275,6 +279,7 @@ class Writer {
     out["units"] = "W m^-2 sr^-1";
     if (field_->visibility()) out["sky"] = sky_extension();
     if (field_->lamps()) out["lamps"] = lamps_extension();
+    if (emission) out["emissionApart"] = true;
     return out;
   }
 

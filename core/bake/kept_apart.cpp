@@ -70,6 +70,14 @@ ApartDecision decide_lamps(const Scene& scene) {
   return {true, which + "surfaces of " + roughness + " mirror them as points"};
 }
 
+ApartDecision decide_emission(const Scene& scene) {
+  const bool textured = std::ranges::any_of(scene.parts, [&](const Part& part) {
+    const Material& material = scene.materials[static_cast<std::size_t>(part.material)];
+    return dot(material.emission, material.emission) > 0 && material.emission_texture.texture >= 0;
+  });
+  return {textured, textured ? "textures glow, more sharply than vertices can say" : "no texture glows"};
+}
+
 std::optional<std::string> softened_emitters(const Scene& scene, int degree) {
   const bool glows = std::ranges::any_of(scene.parts, [&](const Part& part) {
     const Vec3f& emission = scene.materials[static_cast<std::size_t>(part.material)].emission;

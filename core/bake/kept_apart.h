@@ -23,6 +23,9 @@ ApartDecision decide_sky(const Scene&, const Environment* sky, int degree, doubl
 
 ApartDecision decide_lamps(const Scene&);
 
+/// Emission is apart where a texture glows.
+ApartDecision decide_emission(const Scene&);
+
 /// Surfaces that glow are never kept apart. Where a face is smooth enough to show them more sharply than bands 0 ..
 /// degree can, a sentence that says so.
 std::optional<std::string> softened_emitters(const Scene&, int degree);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/artifact/look.h"
 #include "core/bake/field_eye.h"
@@ -46,26 +45,22 @@ std::vector<Eye> eyes_around(const Mesh& mesh) {
   return out;
 }
 
-/// A pixel of a smaller picture, of times x times: as the viewer draws it, shaded once, in what is covered nearest to
-/// its middle, and blended with the background by how much that is.
+/// A pixel of a smaller picture: the mean of times x times, over the background; and whether anything is there.
 struct Small {
   Vec3d colour;
   bool covered = false;
 };
-Small pixel_of(const Vec4f* picture, int row, int column, int times) {
-  Vec3d colour;
-  int covered = 0, least = std::numeric_limits<int>::max();
+Small average(const Vec4f* picture, int row, int column, int times) {
+  Small out;
   for (int y = 0; y < times; ++y) {
     for (int x = 0; x < times; ++x) {
       const Vec4f& p = picture[(row * times + y) * LevelPictures::kFinest + column * times + x];
-      if (!(p.w > 0)) continue;
-      ++covered;
-      const int across = 2 * x + 1 - times, along = 2 * y + 1 - times, off = across * across + along * along;
-      if (off < least) least = off, colour = to_double(Vec3f{p.x, p.y, p.z});
+      out.covered |= p.w > 0;
+      out.colour += to_double(p.w > 0 ? Vec3f{p.x, p.y, p.z} : Vec3f{1, 1, 1} * kBackground);
     }
   }
-  const double share = covered / double(times * times);
-  return {colour * share + Vec3d{1, 1, 1} * (kBackground * (1 - share)), covered > 0};
+  out.colour = out.colour * (1.0 / (times * times));
+  return out;
 }
 
 double difference(const Vec4f* a, const Vec4f* b, int times) {
@@ -73,7 +68,7 @@ double difference(const Vec4f* a, const Vec4f* b, int times) {
   double squares = 0, pixels = 0;
   for (int row = 0; row < size; ++row) {
     for (int column = 0; column < size; ++column) {
-      const Small x = pixel_of(a, row, column, times), y = pixel_of(b, row, column, times);
+      const Small x = average(a, row, column, times), y = average(b, row, column, times);
       if (!x.covered && !y.covered) continue;
       const Vec3d off = cielab(x.colour) - cielab(y.colour);
       squares += dot(off, off), pixels += 1;

@@ -2,9 +2,8 @@
 // How large a coarser level of detail may be on the screen so that nobody sees it take the place of the finer one.
 //
 // Both are drawn as in preview.h from kEyes eyes around them, kFinest pixels across the sphere around the finest level,
-// and from that ever smaller pictures are made, down to 12 pixels, as the viewer draws them: edges are smooth, but what
-// is inside is seen at one place of a pixel. (Averages said 2.1 where pixels of the viewer were 2.6 to 3.9 apart.) At
-// each size
+// and averaged to ever smaller pictures, down to 12 pixels: the viewer takes as many samples of a small model
+// (web_viewer/src/main/fine_picture.ts). At each size
 //   dE = sqrt(mean of the squared CIELAB distance, over the pixels that either level covers), the worst eye's,
 // and the answer is the largest size at which, and below which, dE stays under kVisible.
 // Paper    CIE 1976 L*a*b* of sRGB under D65; 2.3 is the difference that is just noticed (Mahy et al. 1994)

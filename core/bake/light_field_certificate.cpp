@@ -47,7 +47,7 @@ struct Truth {
 class Judge {
  public:
   Judge(const FieldCheck& check, Threads& threads)
-      : tracer_(check.truth), threads_(threads), hidden_(hidden_test(check.truth)), lobes_(make_lobe_table(1)) {
+      : tracer_(check.truth), threads_(threads), hidden_(hidden_test(check.truth)) {
     light_.scene_lights = true;
     if (check.environment) light_.environments.push_back(*check.environment);
   }
@@ -64,7 +64,7 @@ class Judge {
       if (hidden_({at.position, normal, at.position, face})) continue;
       const EyeMaterial material = eye_material(input, at);
       const EyedPoint eyed{{at.position, normal, face}, to_float(v.view), ggx_alpha(material.roughness), material.f0};
-      const double kept = lobe_at(lobes_, dot(v.normal, v.view), material.roughness).kept();
+      const double kept = lobe_at(albedo_table(), dot(v.normal, v.view), material.roughness).kept();
       out.shown.push_back(v.shown);
       out.weight.push_back(v.weight);
       out.truth.push_back(eyed);
@@ -106,7 +106,6 @@ class Judge {
   const Tracer& tracer_;
   Threads& threads_;
   HiddenTest hidden_;
-  LobeTable lobes_;
   ReferenceLight light_;
 };
 

@@ -148,6 +148,9 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   const ApartDecision lamps = decide_lamps(scene);
   f.outgoing.lamps_apart = lamps.apart;
   decide(plan, "lamps", lamps.apart ? "apart" : "in the series", lamps.reason);
+  const ApartDecision emission = decide_emission(scene);
+  f.outgoing.emission_apart = emission.apart;
+  if (emission.apart) decide(plan, "emission", "apart", emission.reason);
   if (const auto softened = softened_emitters(scene, f.outgoing.degree)) {
     decide(plan, "emitters", "in the series", *softened);
     plan.warnings.push_back({"emitters_mirrored_softly", "Of this scene " + *softened + ".", "/steps/0/degree"});
@@ -158,7 +161,8 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   return plan;
 }
 
-FinishSource::FinishSource(const Scene& scene) : scene_(scene), nearest_(scene_.mesh) {
+FinishSource::FinishSource(const Scene& scene)
+    : scene_(scene), nearest_(scene_.mesh), glow_apart_(decide_emission(scene).apart) {
   std::vector<TransferPoint> points;
   for (const Triangle& t : scene_.mesh.triangles) points.push_back(first_corner(scene_.mesh, t));
   scale_.fill(1);
@@ -183,7 +187,7 @@ std::vector<float> FinishSource::values(std::span<const TransferPoint> points, T
           surface_point(scene_, match->triangle, static_cast<float>(match->u), static_cast<float>(match->v));
       const Vec3f color = albedo_at(scene_, p);
       const SurfaceFinish finish = finish_at(scene_, p);
-      const Vec3f glow = emission_at(scene_, p);
+      const Vec3f glow = glow_apart_ ? Vec3f{} : emission_at(scene_, p);
       const std::array<float, kWidth> numbers{color.x, color.y, color.z,         glow.x,
                                               glow.y,  glow.z,  finish.metallic, finish.roughness};
       for (std::size_t k = 0; k < kWidth; ++k) out[i * kWidth + k] = numbers[k] * scale_[k];

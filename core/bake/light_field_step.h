@@ -38,6 +38,7 @@ class FinishSource {
  private:
   Scene scene_;
   ClosestPoint nearest_;
+  bool glow_apart_;  // emission is no reason to split
   std::array<float, kWidth> scale_{};
 };
 

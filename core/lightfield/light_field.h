@@ -10,7 +10,8 @@
 // Below the horizon of n the series goes on with what it has at the horizon (section 7): the fit sees to it.
 // Where a vertex mirrors the sky more sharply than the series can, the sky's part may be kept apart: then there is
 // `visibility` too, and L~ is the series and what mirrored_sky.h adds. Punctual lamps are kept apart in the same way:
-// then `lamps` and `lamp_visibility` are there, and lamp_highlights.h adds what surfaces mirror of them.
+// then `lamps` and `lamp_visibility` are there, and lamp_highlights.h adds what surfaces mirror of them. Where textures
+// glow, emission is theirs (`emission_apart`), as sharp as they are: whoever shows the field adds it.
 // A field of degree 0 may have other channels: any attribute whose distance is Euclid's, like transfer vectors. If it
 // was drawn twice by chance, the first channels are the means of the draws and the last `noise` ones half of their
 // differences.
@@ -51,6 +52,7 @@ struct LightField {
   float sky_slope = 0;              // and the mean square of how that changes with the normal, RGB, per square radian
   std::vector<FieldLamp> lamps;     // that are kept apart
   std::vector<float> lamp_visibility;  // of each of them at each vertex, 0 to 1
+  bool emission_apart = false;         // what the surface's own material emits is not in the series
   std::size_t channels = 3;
   std::size_t noise = 0;
 

@@ -155,11 +155,11 @@ LobeFits::LobeFits(int degree, Threads& threads, const RoughnessRange& range) : 
   EXPECTS(degree >= 0 && degree < kMaxShOrder);
   EXPECTS(range.least <= range.most);
   const Fitter fitter(degree);
-  const LobeTable lobes = make_lobe_table(1);
   const std::size_t count = LobeFit::count(degree), first = row_below(range.least);
   const std::size_t rows = row_below(range.most) + 2 - first;
   for (std::size_t row = first; row < first + rows; ++row) {
-    rows_[row] = {degree, std::vector<float>(kFitColumns * 2 * count), fit_diffuse(fitter, lobes, roughness_of(row))};
+    rows_[row] = {degree, std::vector<float>(kFitColumns * 2 * count),
+                  fit_diffuse(fitter, albedo_table(), roughness_of(row))};
   }
   threads.for_blocks(rows * kFitColumns, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/base/expects.h"
+#include "core/prt/lobe_table.h"
 #include "core/trace/ggx.h"
 
 namespace kiln {
@@ -170,9 +171,7 @@ double mean_square_slope(const Environment& level, double over) {
   return squares / (all * over * over);
 }
 
-MirroredSky::MirroredSky(const SkyLevels& levels) : levels_(levels), lobes_(make_lobe_table(1)) {
-  EXPECTS(levels.size() >= 2);
-}
+MirroredSky::MirroredSky(const SkyLevels& levels) : levels_(levels) { EXPECTS(levels.size() >= 2); }
 
 Vec3d MirroredSky::blurred(const Vec3d& w, double alpha) const {
   const double level = std::clamp(-2 * std::log2(alpha), 0.0, static_cast<double>(levels_.size() - 1));
@@ -205,7 +204,7 @@ Vec3d MirroredSky::seen(const Surface& s, const SkyVisibility& visibility, const
     sum += blurred(w, std::min(1.0, width)) * (weight * visibility_along(visibility, w));
     all += weight;
   }
-  return all > 0 ? lobe_at(lobes_, z, s.roughness).albedo(s.f0) * sum / all : Vec3d{};
+  return all > 0 ? lobe_at(albedo_table(), z, s.roughness).albedo(s.f0) * sum / all : Vec3d{};
 }
 
 }  // namespace kiln

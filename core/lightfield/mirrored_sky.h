@@ -14,7 +14,6 @@
 
 #include "core/base/threads.h"
 #include "core/lightfield/light_field.h"
-#include "core/prt/lobe_table.h"
 #include "core/scene/environment.h"
 
 namespace kiln {
@@ -48,7 +47,6 @@ class MirroredSky {
   Vec3d blurred(const Vec3d& w, double alpha) const;
 
   const SkyLevels& levels_;
-  LobeTable lobes_;
 };
 
 }  // namespace kiln

@@ -240,9 +240,10 @@ class VertexBake {
     for (std::size_t c = 0; c < 3; ++c) {
       float* series = &all[c * out.count()];
       rotate_sh(fits_.degree() + 1, basis_around(point.normal), series, series);
-      series[0] += material.emission[c] * static_cast<float>(kWhite);
+      if (!out.emission_apart) series[0] += material.emission[c] * static_cast<float>(kWhite);
       const double mirrored = double{visibility[0]} * double{material.f0[c] * sky_level_[c]};
       result.mean += (double{series[0]} + mirrored) / (kWhite * 3);
+      if (out.emission_apart) result.mean += double{material.emission[c]} / 3;
     }
     return result;
   }
@@ -387,6 +388,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   const std::vector<std::uint32_t> order = morton_order_of(points);
   OutgoingLight out;
   out.field.degree = params.degree;
+  out.field.emission_apart = params.emission_apart;
   out.field.coefficients.resize(3 * out.field.count() * points.size());
   if (vertex.sky_apart()) out.field.visibility.resize(kVisibilityCount * points.size());
   out.field.lamp_visibility.resize(lamps.size() * points.size());

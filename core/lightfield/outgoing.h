@@ -30,6 +30,8 @@ struct OutgoingBake {
   bool sky_apart = false;
   /// Keeps punctual lamps apart (lamp_highlights.h), the kMostFieldLamps brightest of them, at all vertices.
   bool lamps_apart = false;
+  /// Leaves what the surface emits to its materials.
+  bool emission_apart = false;
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // vertices
 };
 

@@ -12,7 +12,7 @@ Vec3d seen_radiance(const LightField& field, const MirroredSky* sky, const Field
   std::array<double, sh_count(kMaxLightFieldDegree + 1)> y{};
   evaluate_sh(field.degree + 1, normal * (2 * std::max(0.0, above)) - seen, y.data());
   const std::array<double, 3> weight{1 - at.u - at.v, at.u, at.v};
-  Vec3d out;
+  Vec3d out, mean;
   SkyVisibility visibility{};
   std::array<double, kMostFieldLamps> lamps{};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -21,6 +21,7 @@ Vec3d seen_radiance(const LightField& field, const MirroredSky* sky, const Field
       const double w = weight[k] * y[i];
       out += Vec3d{c[i], c[field.count() + i], c[2 * field.count() + i]} * w;
     }
+    mean += Vec3d{c[0], c[field.count()], c[2 * field.count()]} * (weight[k] * y[0]);
     for (std::size_t i = 0; i < field.lamps.size(); ++i)
       lamps[i] += weight[k] * double{field.lamp_visibility[field.lamps.size() * at.triangle[k] + i]};
     if (!field.has_sky()) continue;
@@ -29,7 +30,9 @@ Vec3d seen_radiance(const LightField& field, const MirroredSky* sky, const Field
   }
   if (sky != nullptr) out += sky->seen({normal, at.f0, at.roughness}, visibility, seen);
   if (field.has_lamps()) out += lamp_highlights(field.lamps, lamps, {at.place, normal, seen, at.f0, at.roughness});
-  return {std::max(0.0, out.x), std::max(0.0, out.y), std::max(0.0, out.z)};
+  const double share = field.has_sky() ? kLeastSeen : 0;
+  for (std::size_t c = 0; c < 3; ++c) out[c] = std::max({0.0, share * mean[c], out[c]});
+  return out;
 }
 
 }  // namespace kiln

@@ -3,7 +3,9 @@
 //   L(p, v) = sum_k alpha_k L~_k(R_n v) + what is kept apart (mirrored_sky.h, lamp_highlights.h)                   (1)
 // n is the interpolated normal.
 // Paper   Vanhoey et al. 2015, equation 8, who keep nothing apart.   An eye below the horizon of n counts as
-// at it (section 7); what the series leaves below 0 counts as 0.
+// at it (section 7); what the series leaves below 0 counts as 0. Where the sky is apart the series says how a place
+// differs from it, which rings below 0 in folds: there nothing is less than kLeastSeen of the series' own mean over all
+// directions, so that folds are dim and not black. (Errors stay what they were: README.md.)
 
 #include "core/base/vec.h"
 #include "core/lightfield/lamp_highlights.h"
@@ -12,6 +14,8 @@
 #include "core/mesh/mesh.h"
 
 namespace kiln {
+
+inline constexpr double kLeastSeen = 0.25;
 
 struct FieldPoint {
   const Triangle& triangle;

@@ -30,6 +30,7 @@ class Simplifier {
           .mesh = {},
           .field = {
               .degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}, .lamps = lit_.field.lamps}};
+    out_.record.before.field.emission_apart = lit_.field.emission_apart;
   }
 
   SimplifyResult run() {

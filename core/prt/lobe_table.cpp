@@ -156,6 +156,11 @@ LobeTable make_lobe_table(int order) {
   return out;
 }
 
+const LobeTable& albedo_table() {
+  static const LobeTable table = make_lobe_table(1);
+  return table;
+}
+
 Lobe lobe_at(const LobeTable& table, double nv, double roughness) {
   const auto width = static_cast<std::size_t>(table.width());
   const Between row = between(roughness, kLobeRows);

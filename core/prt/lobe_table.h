@@ -41,6 +41,8 @@ struct LobeTable {
 };
 
 LobeTable make_lobe_table(int order);
+/// Of order 1: made when first asked for, and kept.
+const LobeTable& albedo_table();
 
 /// One entry, in between by interpolation. `nv` and roughness are limited to [0, 1].
 struct Lobe {

@@ -216,11 +216,15 @@ void measure_colours(const std::string& model, const std::vector<std::size_t>& t
   }
 }
 
-/// Ours and extended quadrics on mean colours at the same number of triangles; the rival at its best weight.
+/// Ours and extended quadrics on mean colours at the same number of triangles, each at weights that trade light for
+/// shape.
 void measure_against_colours(const char* bench, const LitMesh& lit, double ratio, Collapse how) {
   const auto target = static_cast<std::size_t>(ratio * static_cast<double>(lit.mesh.triangles.size()));
   const std::string name = how == Collapse::edge ? "edge" : "half-edge";
-  tell_ours(bench, "ours, " + name, lit, {.triangles = target, .collapse = how});
+  for (const double weight : {0.0001, 0.001, 0.003, 0.01, 0.03}) {
+    const std::string by = "ours, " + name + ", geometry " + std::to_string(weight).substr(0, 6);
+    tell_ours(bench, by, lit, {.triangles = target, .geometry_weight = weight, .collapse = how});
+  }
   for (const double weight : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     const double start = process_seconds();
     const LitMesh rival = simplify_colour_qem(lit, target, how, weight);

@@ -189,7 +189,7 @@ test('of components mean and weighted rows are added', () => {
 });
 
 const kFaults = {
-  version: (e) => (e.version = 3),
+  version: (e) => (e.version = 4),
   basis: (e) => (e.condonShortley = true),
   reflected: (e) => delete e.reflected,
   degree: (e) => (e.degree = 9),
@@ -389,6 +389,37 @@ for (const what of ['the sky', 'the sky and lamps'])
       for (const one of seen) near(one.colour, display(between(one), exposure), kSkySteps);
     }));
 
+/// The file with the sky apart, as if its surfaces glowed and the field left that to them.
+function glowing() {
+  const { json, binary } = glbJson(skyFile);
+  Object.assign(json.extensions.KILN_light_field, { version: 3, emissionApart: true });
+  for (const { extensions } of json.meshes[0].primitives) extensions.KILN_radiance_transfer.emission = [0.4, 0.1, 0.2];
+  const text = Buffer.from(JSON.stringify(json));
+  const padded = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]);
+  const chunk = (kind, bytes) => Buffer.concat([Buffer.from(Uint32Array.of(bytes.length, kind).buffer), bytes]);
+  const body = Buffer.concat([chunk(0x4e4f534a, padded), chunk(0x004e4942, binary)]);
+  return Buffer.concat([Buffer.from(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), body]);
+}
+
+test('emission that the field leaves to its surfaces is added to what is seen', async () => {
+  const glowMock = await startMock({ files: { 'scene.glb': glowing() } });
+  try {
+    const seenOf = (mock) => {
+      let found;
+      return withApart(mock, 'tone=none&ev=-2&background=off', async (page) => {
+        found = await look(page, kPoses[0]);
+        for (const { colour, expected } of found.seen) near(colour, display(expected, found.exposure), kSkySteps);
+      }).then(() => found.seen);
+    };
+    const [dark, bright] = [await seenOf(skyMock), await seenOf(glowMock)];
+    bright.forEach(({ expected }, i) =>
+      expected.forEach((x, c) => assert.ok(Math.abs(x - dark[i].expected[c] - [0.4, 0.1, 0.2][c]) < 1e-9)),
+    );
+  } finally {
+    await glowMock.close();
+  }
+});
+
 test('a progressive mesh at its finest mirrors the lamps as the file itself does', () =>
   withApart(lampMock, 'tone=none&ev=-2&background=off', async (page) => {
     const picture = (detail) =>
@@ -499,6 +530,72 @@ test('a level is as coarse as its size on the screen allows, and none flickers',
     await shows(2);
     assert.equal(await back(0.5), Infinity);
     await shows(0);
+  }));
+
+/// Bytes of RGBA of a square in the middle of the picture; of the plain one `times` as large, if asked.
+const middle = (page, side, fine, times = 1) =>
+  page.evaluate(
+    ({ side, fine, times }) => {
+      const { stage } = window.kilnViewer;
+      const gl = stage.renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const [x, y] = [width, height].map((all) => (all - side) >> 1);
+      stage.fine = fine;
+      if (times > 1) stage.camera.setViewOffset(times * width, times * height, times * x, times * (height - y - side), width, height);
+      stage.drawNow();
+      stage.camera.clearViewOffset();
+      const pixels = new Uint8Array(4 * (times * side) ** 2);
+      const [left, low] = times > 1 ? [0, height - times * side] : [x, y];
+      gl.readPixels(left, low, times * side, times * side, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return [...pixels];
+    },
+    { side, fine, times },
+  );
+const decode = (byte) => (byte <= 10 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
+const rootMeanSquare = (a, b) => Math.sqrt(a.reduce((sum, x, i) => sum + (x - b[i]) ** 2, 0) / a.length);
+
+test('a pixel of a small model is the mean of many places within it', () =>
+  withApart(skyMock, 'background=off', async (page) => {
+    const across = await page.evaluate(() => {
+      const { stage } = window.kilnViewer;
+      for (let d = 12, i = 0; i < 30; ++i, d *= stage.pixelsAcross / 50) stage.pose = [0.4 * d, 0.5 * d, 0.77 * d, 0, 0, 0];
+      return stage.pixelsAcross;
+    });
+    assert.ok(Math.abs(across - 50) < 0.01);
+    const [side, times] = [56, 8]; // 384 / 50, and no less
+    const mean = new Float64Array(4 * side * side);
+    (await middle(page, side, false, times)).forEach((byte, i) => {
+      const [x, y] = [Math.floor(i / 4) % (times * side), Math.floor(i / (4 * times * side))];
+      mean[4 * (Math.floor(y / times) * side + Math.floor(x / times)) + (i % 4)] += decode(byte) / times ** 2;
+    });
+    const expected = [...mean].map((x) => 255 * encode(x));
+    const [off, before] = [rootMeanSquare(await middle(page, side, true), expected), rootMeanSquare(await middle(page, side, false), expected)];
+    assert.ok(off < 1 && before > 3 * off, `${off} off where one sample a pixel is ${before}`);
+  }));
+
+test('the square around a small model has the same sky behind it', () =>
+  withApart(skyMock, 'background=sky', async (page) => {
+    await page.evaluate(() => (window.kilnViewer.stage.pose = [20, 10, 30, 0, 0, 0]));
+    const [fine, once] = [await middle(page, 150, true), await middle(page, 150, false)];
+    await page.evaluate(() => (window.kilnViewer.model.root.visible = false));
+    const [sky, alone] = [await middle(page, 150, true), await middle(page, 150, false)];
+    const all = [...Array(150 * 150).keys()];
+    const [apart, model] = [rootMeanSquare(sky, alone, all), rootMeanSquare(once, alone, all)];
+    assert.ok(apart < 1 && model > 5 * apart, `${apart} and ${model} of 255`);
+  }));
+
+test('a model that is large has one sample a pixel, as has what is no light field', () =>
+  withField('background=off', async (page) => {
+    const same = async () => {
+      const [fine, plain] = [await middle(page, 64, true), await middle(page, 64, false)];
+      return fine.every((byte, i) => byte === plain[i]);
+    };
+    assert.ok(await same());
+    assert.equal(await page.evaluate(() => window.kilnViewer.surfaces.stage.fine), false); // as the last call left it
+    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'vertices' }));
+    await until(page, () => window.kilnViewer.stage.fine);
+    await page.evaluate(() => window.kilnViewer.state.set({ mode: 'light' }));
+    await until(page, () => !window.kilnViewer.stage.fine);
   }));
 
 test('the panel tells degree, bytes, and what the report certifies', () =>

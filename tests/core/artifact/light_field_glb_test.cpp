@@ -75,7 +75,7 @@ TEST(LightFieldGlb, WhatIsNotRightIsRefusedByName) {
   EXPECT_EQ(code("\"degree\":2", "\"degree\":-1"), "json_type");
   EXPECT_EQ(code("\"reflected\":true", "\"reflected\":false"), "not_a_baked_scene");
   EXPECT_EQ(code("\"_SLF_0\",\"_SLF_1\"", "\"_SLF_1\",\"_SLF_0\""), "slot_count_mismatch");
-  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":3"), "unsupported_version");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":4"), "unsupported_version");
 }
 
 SkyLevels random_sky(float brightest) {
@@ -204,6 +204,11 @@ TEST(LightFieldGlb, AFileSaysTheVersionThatItNeeds) {
   EXPECT_EQ(version(with_field(2)), '1');
   EXPECT_EQ(version(with_sky()), '1');  // readers of before know it
   EXPECT_EQ(version(with_lamps()), '2');
+  BakedScene glowing = with_field(2);
+  glowing.field.emission_apart = true;
+  EXPECT_EQ(version(glowing), '3');
+  EXPECT_TRUE(read_baked_glb(*write_baked_glb(glowing))->field.emission_apart);
+  EXPECT_FALSE(read_baked_glb(*write_baked_glb(with_field(2)))->field.emission_apart);
 }
 
 TEST(LightFieldGlb, LampsThatAreNotRightAreRefusedByName) {
@@ -219,7 +224,7 @@ TEST(LightFieldGlb, LampsThatAreNotRightAreRefusedByName) {
   EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[-1,1.0,2.0]"), "number_out_of_range");
   EXPECT_EQ(code("\"_SLF_LAMP_0\",\"_SLF_LAMP_1\"", "\"_SLF_LAMP_1\",\"_SLF_LAMP_0\""), "slot_count_mismatch");
   EXPECT_EQ(code("\"lights\":[{", "\"lights\":[],\"others\":[{"), "number_out_of_range");
-  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":2", "\"KILN_light_field\":{\"version\":3"), "unsupported_version");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":2", "\"KILN_light_field\":{\"version\":4"), "unsupported_version");
 }
 
 TEST(LightFieldGlb, AProgressiveMeshTravelsWithTheScene) {

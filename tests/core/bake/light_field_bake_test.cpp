@@ -211,6 +211,31 @@ TEST(LightFieldEmitters, AreNamedWhereSmoothSurfacesMirrorThem) {
   EXPECT_NE(said->find("7 bands"), std::string::npos) << *said;
 }
 
+/// Of four texels across the face the first two glow.
+Scene glowing_texture() {
+  Scene scene = metal_face(0.9F);
+  scene.images = {{.name = "glow", .mime = "image/png", .encoded = {}, .width = 4, .height = 1, .rgba = {}}};
+  scene.images[0].rgba = {255, 255, 255, 255, 255, 255, 255, 255, 0, 0, 0, 255, 0, 0, 0, 255};
+  scene.textures = {{.image = 0, .nearest = true}};
+  scene.mesh.uv0 = {{0, 0}, {1, 0}, {0, 1}};
+  scene.materials[0].emission = {3, 2, 1};
+  return scene;
+}
+
+TEST(LightFieldEmission, OfTexturesIsApartAndAsSharpAsTheyAre) {
+  Scene scene = glowing_texture();
+  EXPECT_FALSE(decide_emission(scene).apart);  // all of it glows
+  scene.materials[0].emission_texture.texture = 0;
+  EXPECT_TRUE(decide_emission(scene).apart);
+  LightField field{.degree = 0, .coefficients = std::vector<float>(9, 0.5F)};
+  const auto seen = [&](double u) { return FieldEye(scene, field, {}).seen({0, u, 0, 0}, {0, 0, 1}, {0, 0, 1}); };
+  const Vec3d before = seen(0.45);
+  EXPECT_NEAR(before.x, seen(0.55).x, 1e-12);  // weights sum to 1 within rounding
+  field.emission_apart = true;
+  EXPECT_NEAR(length(seen(0.45) - before - Vec3d{3, 2, 1}), 0, 1e-6);  // floats of materials
+  EXPECT_NEAR(length(seen(0.55) - before), 0, 1e-6);
+}
+
 /// Bands 0 and 1 hold a sky that is a constant and a slope; a small lamp they do not.
 TEST(LightFieldSky, WhatBandsLeaveOut) {
   const auto sky = [](auto&& radiance) { return averaged_sky(64, 2, radiance); };

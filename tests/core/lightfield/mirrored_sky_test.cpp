@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "core/base/random.h"
+#include "core/lightfield/seen.h"
+#include "core/prt/lobe_table.h"
 #include "core/trace/ggx.h"
 
 namespace kiln {
@@ -114,6 +116,21 @@ TEST(MirroredSky, WhatIsHiddenIsNotMirrored) {
   rings[0] *= 3, rings[1] = -9;  // 3 to the sides, below 0 upwards
   EXPECT_DOUBLE_EQ(visibility_along(rings, {1, 0, 0}), 1);
   EXPECT_DOUBLE_EQ(visibility_along(rings, {0, 1, 0}), 0);
+}
+
+TEST(MirroredSky, WhereTheSeriesRingsBelowNothingSomethingOfItsMeanIsSeen) {
+  Threads threads(1);
+  const SkyLevels levels = blur_sky(overcast_sky(), 0.05, threads);
+  const MirroredSky sky(levels);
+  LightField field{.degree = 1, .coefficients = std::vector<float>(36)};
+  for (std::size_t v = 0; v < 3; ++v)
+    for (std::size_t c = 0; c < 3; ++c) field.of(v)[4 * c] = 2, field.of(v)[4 * c + 1] = -9;  // below 0 upwards
+  const Triangle corners{0, 1, 2};
+  const FieldPoint at{corners, 0.2, 0.3, {0, 1, 0}, {0, 1, 0}, kF0, 0.2};
+  EXPECT_EQ(seen_radiance(field, nullptr, at), Vec3d{});  // equation 8 of the paper
+  field.visibility.resize(3 * kVisibilityCount);
+  const double mean = 2 / std::sqrt(4 * std::numbers::pi);
+  EXPECT_NEAR(seen_radiance(field, &sky, at).x, kLeastSeen * mean, 1e-12);
 }
 
 TEST(MirroredSky, MapsAreTheSameForAnyNumberOfThreadsAndNoFinerThanAsked) {

@@ -4,7 +4,7 @@
 // is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
 //
 // Where the file keeps the sky apart (mirrored_sky.ts) or lamps (field_lamps.ts), what they add belongs to the sum. What a
-// vertex sees of them is interpolated too.
+// vertex sees of them is interpolated too. Emission that is kept apart is the material's, and whoever shows it adds it.
 //
 // A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
 // c; what is left over follows, all of red first; then texels of what is seen of the sky, and of lamps. 16 bytes a texel: 160 a vertex at
@@ -30,6 +30,7 @@ export interface LightFieldExtension {
   offset: number[];
   sky?: SkyExtension;
   lamps?: LampExtension; // of version 2
+  emissionApart?: boolean; // of version 3
 }
 
 /// r-RFs of the vertices of one primitive.
@@ -37,12 +38,16 @@ export interface FieldTexels {
   degree: number;
   sky: boolean; // the sky is kept apart
   lamps: number; // so many lamps are
+  emission: boolean; // what the material emits is, too
   halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(this) of each vertex
   unit: number; // a coefficient is unit * half; a power of two
 }
 
 /// What a field holds for each vertex.
-export type FieldShape = Pick<FieldTexels, 'degree' | 'sky' | 'lamps'>;
+export type FieldShape = Pick<FieldTexels, 'degree' | 'sky' | 'lamps' | 'emission'>;
+
+/// That part of a shape which says how many numbers a vertex has.
+type Numbers = Pick<FieldShape, 'degree' | 'sky' | 'lamps'>;
 
 const kName = 'KILN_light_field';
 const kMostDegree = 8;
@@ -54,16 +59,16 @@ export const fieldCount = (degree: number): number => (degree + 1) ** 2;
 const seriesTexels = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
 
 /// Texels of a vertex.
-export const texelsOf = (shape: FieldShape): number => firstLampTexel(shape) + Math.ceil(shape.lamps / 8);
+export const texelsOf = (shape: Numbers): number => firstLampTexel(shape) + Math.ceil(shape.lamps / 8);
 
-const firstLampTexel = ({ degree, sky }: FieldShape): number =>
+const firstLampTexel = ({ degree, sky }: Numbers): number =>
   seriesTexels(degree) + (sky ? Math.ceil(kVisibilityCount / 8) : 0);
 
 /// Which half of a vertex is coefficient `i` of what it sees of the sky. Those are not in units.
 export const skyHalfAt = (degree: number, i: number): number => 8 * seriesTexels(degree) + i;
 
 /// Which one is how much it sees of lamp `k`.
-export const lampHalfAt = (shape: FieldShape, k: number): number => 8 * firstLampTexel(shape) + k;
+export const lampHalfAt = (shape: Numbers, k: number): number => 8 * firstLampTexel(shape) + k;
 
 /// Which half of a vertex is coefficient `i` of channel `c`.
 export function halfAt(degree: number, i: number, c: number): number {
@@ -83,7 +88,7 @@ function checkField(e: LightFieldExtension): void {
   const must = (good: boolean, member: keyof LightFieldExtension, what: string) => {
     if (!good) throw new Error(`/extensions/${kName}/${member}: ${what}`);
   };
-  must(e.version === 1 || e.version === 2, 'version', `only versions 1 and 2 are read, this is ${e.version}`);
+  must([1, 2, 3].includes(e.version), 'version', `only versions 1 to 3 are read, this is ${e.version}`);
   const basis = e.basis === 'real-sh' && e.condonShortley === false;
   must(basis, 'basis', 'must be real-sh without the Condon-Shortley phase');
   must(e.reflected === true, 'reflected', 'radiance functions must be reflected');
@@ -97,6 +102,8 @@ function checkField(e: LightFieldExtension): void {
   for (const list of ['scale', 'offset'] as const)
     must(e[list]?.length === rank && e[list].every(Number.isFinite), list, `must be ${rank} numbers`);
   if (e.sky) checkSky(e.sky, `/extensions/${kName}/sky`);
+  const flag = e.emissionApart === undefined || typeof e.emissionApart === 'boolean';
+  must(flag, 'emissionApart', 'must be true or false');
   if (e.lamps) checkLamps(e.lamps, `/extensions/${kName}/lamps`);
 }
 
@@ -122,13 +129,18 @@ interface SeenNumbers {
 export function fieldTexels(
   field: StoredTransfer,
   attributes: readonly Float32Array[],
-  apart: { sky?: SeenNumbers; lamps?: SeenNumbers } = {},
+  apart: { sky?: SeenNumbers; lamps?: SeenNumbers; emission?: boolean } = {},
 ): FieldTexels {
   const degree = field.order - 1;
   const stride = 3 * field.slots;
   const vertices = attributes[0].length / 4;
   const out = emptyTexels(
-    { degree, sky: apart.sky !== undefined, lamps: apart.lamps?.extension.scale.length ?? 0 },
+    {
+      degree,
+      sky: apart.sky !== undefined,
+      lamps: apart.lamps?.extension.scale.length ?? 0,
+      emission: apart.emission === true,
+    },
     vertices, largestOf(field),
   );
   const { series, visibility, lamps } = texelWriter(out);
@@ -225,6 +237,9 @@ export interface Mirror {
   roughness: number;
 }
 
+/// Where the sky is apart nothing is less than this share of the series' own mean (core/lightfield/seen.h).
+export const kLeastSeen = 0.25;
+
 /// Radiance that an eye sees between three vertices: (8). `weights` are barycentric. `mirror`: where something is kept apart.
 export function seenRadiance(
   field: FieldTexels,
@@ -251,5 +266,7 @@ export function seenRadiance(
   const seen = Array.from({ length: field.lamps }, (_, k) => mixed(lampHalfAt(field, k)));
   const ofSky = field.sky && sky ? sky.seen(normal, raised, f0, roughness, visibility) : [0, 0, 0];
   const ofLamps = lampHighlights(lamps.slice(0, field.lamps), seen, { place, normal, view: raised, f0, roughness });
-  return series.map((x, c) => Math.max(0, x + ofSky[c] + ofLamps[c]));
+  const mean = (c: number): number => field.unit * y[0] * mixed(halfAt(field.degree, 0, c));
+  const least = [0, 1, 2].map((c) => (field.sky ? kLeastSeen * Math.max(0, mean(c)) : 0));
+  return series.map((x, c) => Math.max(least[c], x + ofSky[c] + ofLamps[c]));
 }

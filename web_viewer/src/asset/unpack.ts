@@ -44,7 +44,7 @@ export interface Unpacked {
 /// A light field on its way out of the file.
 interface StoredField {
   series: StoredTransfer;
-  apart: { sky?: SkyExtension; lamps?: LampExtension };
+  apart: { sky?: SkyExtension; lamps?: LampExtension; emission?: boolean };
   sky: SkyData | null;
 }
 
@@ -168,8 +168,9 @@ function takeMeshless(json: Json, bytesIn: (view: number) => Uint8Array): Pick<U
 function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredField | null {
   const extension = readLightField(json);
   if (!extension) return null;
-  const { sky, lamps } = takeExtension(json, kField, extension);
-  return { series: storedField(extension, bytesIn), apart: { sky, lamps }, sky: sky ? readSky(sky, bytesIn) : null };
+  const { sky, lamps, emissionApart: emission } = takeExtension(json, kField, extension);
+  const series = storedField(extension, bytesIn);
+  return { series, apart: { sky, lamps, emission }, sky: sky ? readSky(sky, bytesIn) : null };
 }
 
 /// A copy: light/progressive_mesh.ts reads it when it is asked for.
@@ -266,10 +267,11 @@ function takeBaked(
   const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
   const all = (list: readonly string[]) => list.map((name) => floatsOf(name, 4));
-  const { sky, lamps } = light?.apart ?? {};
+  const { sky, lamps, emission } = light?.apart ?? {};
   const seen = <T extends { attributes: string[] }>(extension: T | undefined) =>
     extension && { extension, attributes: all(extension.attributes) };
-  const field = light && fieldTexels(light.series, all(light.series.attributes), { sky: seen(sky), lamps: seen(lamps) });
+  const numbers = { sky: seen(sky), lamps: seen(lamps), emission };
+  const field = light && fieldTexels(light.series, all(light.series.attributes), numbers);
   const apart = [light?.series, sky, lamps].flatMap((one) => one?.attributes ?? []);
   const taken = [...names, ...matrices, ...apart, 'COLOR_0'];
   for (const name of taken) delete primitive.attributes[name];

@@ -27,6 +27,8 @@ export interface BakedPart {
   unlit: MeshBasicMaterial; // of scene 0, which says opacity and sides
   albedo: TransferPart['albedo'];
   finish: Finish | null; // where something mirrors
+  glow: Glow | null; // emission through a texture,
+  emission: TransferPart['emission']; // and where it has none
   light: BufferAttribute;
 }
 
@@ -122,7 +124,7 @@ export class BakedModel {
     });
     part.mesh.material = material;
     const mesh = part.mesh as BakedPart['mesh'];
-    return { mesh, geometry, material, unlit, albedo: part.albedo, finish, light };
+    return { mesh, geometry, material, unlit, albedo: part.albedo, finish, glow, emission: part.emission, light };
   }
 
   dispose(): void {

@@ -17,7 +17,7 @@ import { fieldMaterial, fieldTexture, type SkyLook } from '../shaders/field_mate
 import { lobeTexture } from '../shaders/mirror';
 import { skyTexture } from '../shaders/sky_code';
 import type { BakedModel, BakedPart } from './baked_model';
-import { colourAt, finishAt } from './texture_probe';
+import { colourAt, emissionAt, finishAt } from './texture_probe';
 
 export type Evaluation = 'fragment' | 'vertex';
 
@@ -34,6 +34,7 @@ interface Dressed {
 /// Owns what it makes of the field, and nothing of the model.
 export class FieldLook {
   readonly degree: number;
+  readonly emission: boolean; // is kept apart
   readonly bytes: number; // of its textures
   private readonly parts: Dressed[];
   /// What the field keeps apart; null: nothing.
@@ -47,6 +48,7 @@ export class FieldLook {
     const { sky, lamps } = apart;
     this.lamps = lamps;
     this.degree = field[0].degree;
+    this.emission = field[0].emission;
     this.bytes = field.reduce((sum, { halves }) => sum + halves.byteLength, 0);
     if (sky) {
       this.mirrored = new MirroredSky(sky);
@@ -84,7 +86,10 @@ export class FieldLook {
     );
     const { mirrored: sky, lamps } = this;
     const mirror = { sky, lamps, place: place.toArray(), ...mirroringAt(part.part, corners, weights) };
-    return seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray(), mirror);
+    const seen = seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray(), mirror);
+    if (!part.texels.emission) return seen;
+    const emitted = emissionAt(part.part, corners, weights);
+    return seen.map((x, c) => x + emitted[c]);
   }
 
   dispose(): void {
@@ -100,11 +105,12 @@ export class FieldLook {
 }
 
 function dress(part: BakedPart, field: FieldTexels, { sky, lamps }: FieldLook, most: number): Dressed {
-  const { mesh, geometry, material, unlit, albedo, finish } = part;
+  const { mesh, geometry, material, unlit, albedo, finish, glow, emission } = part;
   const own = { geometry, material };
   const { texture, texels } = fieldTexture(field, most);
   const vertexAlbedo = own.geometry.hasAttribute('_albedo');
-  const surface = { shape: field, texture, unit: field.unit, unlit, albedo, finish, sky, lamps, vertexAlbedo };
+  const look = { unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo };
+  const surface = { shape: field, texture, unit: field.unit, ...look };
   const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
   return { part, mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
 }

@@ -103,7 +103,8 @@ class ProgressiveShape {
     const light = this.mesh.columns.get('coefficients')!;
     const all = light.values.length / light.width;
     const { degree, columns } = this.mesh;
-    const shape = { degree, sky: columns.has('visibility'), lamps: columns.get('lamps')?.width ?? 0 };
+    const emission = level.field?.emission ?? false;
+    const shape = { degree, sky: columns.has('visibility'), lamps: columns.get('lamps')?.width ?? 0, emission };
     if (shape.sky && !sky) throw new Error('The progressive mesh sees a sky that the scene has not.');
     if (shape.lamps !== lamps.length) throw new Error('The progressive mesh sees other lamps than the scene has.');
     const empty = emptyTexels(shape, all, this.mesh.largest('coefficients'));
@@ -162,7 +163,8 @@ class ProgressiveShape {
     }
   }
 
-  private makePart({ unlit, albedo, finish, geometry: own }: BakedPart, { sky, lamps }: Apart, index: number): Part {
+  private makePart(look: BakedPart, { sky, lamps }: Apart, index: number): Part {
+    const { unlit, albedo, finish, glow, emission, geometry: own } = look;
     const { part, triangles, columns } = this.mesh;
     const most = part.length > 0 ? part.reduce((sum, one) => sum + Number(one === index), 0) : triangles.length / 3;
     const geometry = new BufferGeometry();
@@ -179,7 +181,8 @@ class ProgressiveShape {
     geometry.setAttribute('corners', new BufferAttribute(corners, 3));
     const vertexAlbedo = geometry.hasAttribute('_albedo');
     const { unit } = this.texels;
-    const surface = { shape: this.texels, unit, texture: this.texture, unlit, albedo, finish, sky, lamps, vertexAlbedo };
+    const dress = { unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo };
+    const surface = { shape: this.texels, unit, texture: this.texture, ...dress };
     const materials = [fieldMaterial(surface, false), fieldMaterial(surface, true)] as const;
     const mesh = new Mesh(geometry, materials[0]);
     mesh.frustumCulled = false; // its bounds change with the level

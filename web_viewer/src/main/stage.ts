@@ -16,6 +16,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { ShoulderToneMapping } from '../shaders/tone_map';
+import { FinePicture, kFinest } from './fine_picture';
 import type { ToneMap } from './view_state';
 import { pixelRatio } from './webgl';
 
@@ -48,6 +49,9 @@ export class Stage {
   drawModel: (() => void) | null = null;
   onDrawn: (() => void) | null = null;
   onMoved: (() => void) | null = null;
+  /// Whether a model that is small gets several samples a pixel.
+  fine = false;
+  private finePicture: FinePicture | null = null;
   private readonly box = new Box3();
   private readonly bounds = new Sphere(new Vector3(), 1);
   private readonly resizes: ResizeObserver;
@@ -87,8 +91,11 @@ export class Stage {
   }
 
   drawScene(): void {
-    if (this.drawModel) this.drawModel();
-    else this.renderer.render(this.scene, this.camera);
+    if (this.drawModel) return this.drawModel();
+    this.renderer.render(this.scene, this.camera);
+    if (!this.fine || this.pixelsAcross >= kFinest) return;
+    this.finePicture ??= new FinePicture(this.renderer);
+    this.finePicture.draw(this.scene, this.camera, this.box, this.pixelsAcross);
   }
 
   /// Sets the driver to what the next picture needs. Without it that picture waits for one shader after the other.
@@ -108,7 +115,7 @@ export class Stage {
     if (!box.isEmpty()) box.getBoundingSphere(this.bounds);
     if (!(this.bounds.radius > 0)) this.bounds.radius = 1;
     this.controls.minDistance = 0.02 * this.bounds.radius;
-    this.controls.maxDistance = 30 * this.bounds.radius;
+    this.controls.maxDistance = 200 * this.bounds.radius; // some twelve pixels, the smallest that levels are compared at
   }
 
   get radius(): number {
@@ -167,8 +174,9 @@ export class Stage {
   /// where two depths are alike.
   private fitPlanes(): void {
     const { center, radius } = this.bounds;
-    this.camera.near = Math.max(0.005 * radius, 0.9 * (this.camera.position.distanceTo(center) - radius));
-    this.camera.far = 64 * radius;
+    const distance = this.camera.position.distanceTo(center);
+    this.camera.near = Math.max(0.005 * radius, 0.9 * (distance - radius));
+    this.camera.far = distance + 64 * radius;
     this.camera.updateProjectionMatrix();
   }
 
@@ -188,6 +196,7 @@ export class Stage {
     this.resizes.disconnect();
     this.canvas.removeEventListener('webglcontextrestored', this.requestDraw);
     this.controls.dispose();
+    this.finePicture?.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss(); // the GPU's memory now, not when the garbage collector comes by
   }

@@ -32,6 +32,7 @@ export class Surfaces {
   dress({ field, model }: Level, mode: Mode): void {
     const byField = mode === 'shaded' || mode === 'vertices' || isDifference(mode);
     field?.show(byField ? (mode === 'vertices' ? 'vertex' : 'fragment') : null);
+    this.stage.fine = field !== null && byField;
     model.setWhite(mode === 'light');
   }
 

@@ -24,6 +24,12 @@ export function finishAt({ geometry, finish }: BakedPart, corners: Three, weight
   return [roughness * g, metallic * b];
 }
 
+export function emissionAt({ geometry, glow, emission }: BakedPart, corners: Three, weights: Three): number[] {
+  if (!glow) return [...emission];
+  const [r, g, b] = texelAt(glow.map, geometry, corners, weights);
+  return new Color(r, g, b).convertSRGBToLinear().multiply(glow.factor).toArray();
+}
+
 const mixed = (attribute: { getComponent: BufferAttribute['getComponent']; itemSize: number }, corners: Three, weights: Three) =>
   Array.from({ length: attribute.itemSize }, (_, c) =>
     corners.reduce((sum, corner, k) => sum + weights[k] * attribute.getComponent(corner, c), 0),

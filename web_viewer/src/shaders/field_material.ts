@@ -2,7 +2,8 @@
 // are. The geometry has three vertices of its own for each triangle (main/field_look.ts): a fragment must know its
 // corners, and WebGL 2 does not tell. Harmonics are evaluated once, whatever the number of corners. Albedo, textures and
 // emission are in the field; of the textures only the opacity counts. Where the field keeps the sky apart (sky_code.ts) or
-// lamps (lamp_code.ts), base colour and finish say how a fragment mirrors them.
+// lamps (lamp_code.ts), base colour and finish say how a fragment mirrors them; where it keeps emission apart, that is the
+// fragment's.
 //
 // With PER_VERTEX the field is evaluated at the vertices and colours are interpolated (figure 6 of the paper): several
 // times faster, and highlights break at edges.
@@ -17,10 +18,19 @@ import {
   type Texture,
   UnsignedIntType,
 } from 'three';
-import { type FieldShape, type FieldTexels, fieldCount, halfAt, lampHalfAt, skyHalfAt, texelsOf } from '../asset/light_field';
+import {
+  type FieldShape,
+  type FieldTexels,
+  fieldCount,
+  halfAt,
+  kLeastSeen,
+  lampHalfAt,
+  skyHalfAt,
+  texelsOf,
+} from '../asset/light_field';
 import type { FieldLamp } from '../asset/field_lamps';
 import { kVisibilityCount } from '../asset/mirrored_sky';
-import { type Finish, sides, transformOf, uvOf } from './baked_material';
+import { type Finish, type Glow, sides, transformOf, uvOf } from './baked_material';
 import { harmonicsCode } from './harmonics_code';
 import { lampFunctions, lampUniforms } from './lamp_code';
 import { skyFunctions } from './sky_code';
@@ -56,6 +66,8 @@ function fieldFunctions(shape: FieldShape): string {
   for (let c = 0; c < 3; ++c)
     for (let i = 0; i < fieldCount(degree); ++i)
       put(halfAt(degree, i, c), (one) => `sum.${'rgb'[c]} += ${one} * y${i};`);
+  for (let c = 0; shape.sky && c < 3; ++c)
+    put(halfAt(degree, 0, c), (one) => `least.${'rgb'[c]} = ${one};`);
   for (let i = 0; shape.sky && i < kVisibilityCount; ++i)
     put(skyHalfAt(degree, i), (one) => `visibility[${i}] = ${one};`);
   for (let k = 0; k < shape.lamps; ++k) put(lampHalfAt(shape, k), (one) => `lamps[${k}] = ${one};`);
@@ -84,7 +96,7 @@ vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, vec4 
   float x = r.x, y = r.y, z = r.z;
   ${harmonicsCode(degree)}
   ivec2 a = placeOf(corners.x), b = placeOf(corners.y), c = placeOf(corners.z);
-  vec3 sum = vec3(0.0);
+  vec3 sum = vec3(0.0), least = vec3(0.0);
   vec4 low, high;
   ${shape.sky ? `float visibility[${kVisibilityCount}];` : ''}
   ${shape.lamps > 0 ? `float lamps[${shape.lamps}];` : ''}
@@ -92,7 +104,7 @@ vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, vec4 
   sum *= fieldUnit;
   ${shape.sky ? 'sum += mirroredSky(n, seen, mirror.rgb, mirror.a, visibility);' : ''}
   ${shape.lamps > 0 ? 'sum += lampHighlights(place, n, seen, mirror.rgb, mirror.a, lamps);' : ''}
-  return max(sum, vec3(0.0));
+  return max(sum, max(vec3(0.0), fieldUnit * ${kLeastSeen} * y0 * least));
 }`;
 }
 
@@ -115,6 +127,9 @@ varying vec2 vAlbedoUv;
 #endif
 #ifdef FINISH_MAP
 varying vec2 vFinishUv;
+#endif
+#ifdef EMISSION_MAP
+varying vec2 vEmissionUv;
 #endif
 `;
 
@@ -159,6 +174,9 @@ uniform mat3 albedoMapTransform;
 #ifdef FINISH_MAP
 uniform mat3 finishMapTransform;
 #endif
+#ifdef EMISSION_MAP
+uniform mat3 emissionMapTransform;
+#endif
 #ifdef USE_UV1_SET
 attribute vec2 uv1;
 #endif
@@ -180,6 +198,9 @@ void main() {
 #ifdef FINISH_MAP
   vFinishUv = (finishMapTransform * vec3(FINISH_UV, 1.0)).xy;
 #endif
+#ifdef EMISSION_MAP
+  vEmissionUv = (emissionMapTransform * vec3(EMISSION_UV, 1.0)).xy;
+#endif
 #ifdef PER_VERTEX
   ivec3 here = ivec3(int(corners[own]));
   vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), position, normalize(n), normalize(toEye), mirrorOf(baseHere().rgb));
@@ -196,6 +217,10 @@ void main() {
 const fragmentShader = (functions: string) => /* glsl */ `
 ${varyings}
 uniform float alphaCutoff;
+uniform vec3 emission;
+#ifdef EMISSION_MAP
+uniform sampler2D emissionMap;
+#endif
 vec4 textureHere(sampler2D map, vec2 uv) { return texture2D(map, uv); }
 ${surfaceFunctions}
 #ifndef PER_VERTEX
@@ -211,7 +236,11 @@ void main() {
 #else
   vec3 seen = radianceSeen(vCorners, vWeights, vPlace, normalize(vNormal), normalize(vToEye), mirrorOf(base.rgb));
 #endif
-  gl_FragColor = vec4(seen, base.a);
+  vec3 emitted = emission;
+#ifdef EMISSION_MAP
+  emitted *= textureHere(emissionMap, vEmissionUv).rgb;
+#endif
+  gl_FragColor = vec4(seen + emitted, base.a);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
   #include <dithering_fragment>
@@ -231,6 +260,8 @@ export interface FieldSurface {
   unlit: MeshBasicMaterial; // of scene 0: base colour texture, opacity and sides
   albedo: readonly number[];
   finish: Finish | null;
+  glow: Glow | null;
+  emission: readonly number[]; // without glow
   sky: SkyLook | null;
   lamps: readonly FieldLamp[];
   vertexAlbedo: boolean; // the geometry has `_albedo`
@@ -238,16 +269,19 @@ export interface FieldSurface {
 
 /// Owns only itself; the textures belong to others.
 export function fieldMaterial(surface: FieldSurface, perVertex: boolean): ShaderMaterial {
-  const { shape, texture, unit, unlit, albedo, finish, sky, lamps, vertexAlbedo } = surface;
+  const { shape, texture, unit, unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo } = surface;
   const mirrors = sky !== null || lamps.length > 0;
   const defines: Record<string, string> = {};
   const map = mirrors || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
   const finishMap = mirrors ? (finish?.map ?? null) : null;
+  const emissionMap = shape.emission ? (glow?.map ?? null) : null;
+  const emitted = !shape.emission ? new Color(0) : (glow?.factor ?? new Color().setRGB(emission[0], emission[1], emission[2]));
   if (perVertex) defines.PER_VERTEX = '';
   if (vertexAlbedo) defines.VERTEX_ALBEDO = '';
   if (map) [defines.ALBEDO_MAP, defines.ALBEDO_UV] = ['', uvOf(map)];
   if (finishMap) [defines.FINISH_MAP, defines.FINISH_UV] = ['', uvOf(finishMap)];
-  if ([map, finishMap].some((one) => one?.channel === 1)) defines.USE_UV1_SET = '';
+  if (emissionMap) [defines.EMISSION_MAP, defines.EMISSION_UV] = ['', uvOf(emissionMap)];
+  if ([map, finishMap, emissionMap].some((one) => one?.channel === 1)) defines.USE_UV1_SET = '';
   const functions = fieldFunctions(shape);
   const { r, g, b } = new Color().setRGB(albedo[0], albedo[1], albedo[2]);
   return new ShaderMaterial({
@@ -271,6 +305,9 @@ export function fieldMaterial(surface: FieldSurface, perVertex: boolean): Shader
       roughness: { value: finish?.roughness ?? 1 },
       finishMap: { value: finishMap },
       finishMapTransform: { value: transformOf(finishMap) },
+      emission: { value: emitted },
+      emissionMap: { value: emissionMap },
+      emissionMapTransform: { value: transformOf(emissionMap) },
     },
     ...sides(unlit),
   });
