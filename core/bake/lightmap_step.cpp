@@ -393,10 +393,12 @@ void LightmapStep::light(const LitPlaces& lit, Threads& threads) {
     lightmap_.texels[at.texel] = direct[i] + reflected[i];
     known[at.texel] = 1;
   }
-  for (const std::uint32_t texel : out_of_reach(solid, known)) known[texel] = 1;
+  const std::vector<std::uint32_t> dark = out_of_reach(solid, known);
   hidden_ = map_.places.size() - static_cast<std::size_t>(std::ranges::count_if(
                                      map_.places, [&](const TexelPlace& p) { return known[p.texel] != 0; }));
+  hidden_ -= dark.size();
   fill_texels(map_, charts_, std::move(known), lightmap_.texels);
+  for (const std::uint32_t texel : dark) lightmap_.texels[texel] = {};
   stitch_seams(seams_, map_, lightmap_.texels);
 }
 
