@@ -2,7 +2,8 @@
 // The surface of a scene with the light that leaves it, for rays that look at it.
 //   L(x -> w) = rho(x) x light of the nearest sender, or by a path where none stands for x (sender_paths.h)         (1)
 // Table    as fine as that of senders.h, with the mean of rho over each entry: a hit costs one read, and sees a texture
-//          no sharper than the light on it. Where there is no entry rho is that of the hit.
+//          no sharper than the light on it. Where hits look for themselves (senders.h) an entry has what its middle
+//          finds. Where there is no entry, and on paths, rho is that of the hit.
 // Memory   16 bytes a cell
 // Units   W m^-2 sr^-1; `light` of a sender is irradiance / pi.   Repeat  a pure function of its arguments
 

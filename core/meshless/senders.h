@@ -124,7 +124,8 @@ class Senders {
 
 inline Senders::Area Senders::area_of(std::uint32_t triangle, std::uint32_t cell, std::uint32_t part) {
   constexpr float kSize = 1.0F / kParts;
-  return {triangle, cell, Vec2f{static_cast<float>(part % kParts), static_cast<float>(part / kParts)} * kSize, kSize};
+  const std::uint32_t column = part % kParts, row = part / kParts;
+  return {triangle, cell, {static_cast<float>(column) * kSize, static_cast<float>(row) * kSize}, kSize};
 }
 
 template <class F>
