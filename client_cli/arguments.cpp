@@ -165,6 +165,9 @@ void add_eval(Program& program) {
   add_light(command.parser, fields.light, kLightHelp + std::string("; the baked light when not given"));
   add_lamp(command.parser, fields.lamp);
   command.parser->add_flag("--indirect", fields.indirect, "with --light: reflected light only");
+  command.parser->add_flag("--lightmap", fields.lightmap, "what the lightmap shows, not the vertices")
+      ->excludes("--light")
+      ->excludes("--env");
   command.parser->add_option("--sh-order", fields.sh_order, "only the first bands of the light; 0: all")
       ->check(CLI::Range(0, 10))
       ->type_name("N");

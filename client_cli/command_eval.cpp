@@ -40,6 +40,18 @@ Outcome<ExitCode> run_lamp(const EvalOptions& options, const std::vector<QueryPo
   return write_values(table, scale, options.output, session);
 }
 
+/// The light that an artefact of one job shows: the vertices', or the lightmap's where that is asked for.
+Outcome<void> choose_lightmap(const EvalOptions& options, const Bytes& bytes, BakedScene& baked) {
+  KILN_TRY(map, or_failure(read_lightmap(bytes)));
+  if (options.lightmap && map.side == 0)
+    return fail(ExitCode::usage, "no_lightmap", "has no lightmap: leave out --lightmap", options.file);
+  if (map.side > 0)
+    say(options.lightmap ? "its lightmap, as the 8-bit image in the file has it"
+                         : "its vertices, not its lightmap: that is --lightmap");
+  if (options.lightmap) baked.lightmap = std::move(map);
+  return {};
+}
+
 }  // namespace
 
 Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
@@ -65,6 +77,8 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
         : light.empty()           ? "the artefact's own lamps"
                                   : "the light it was baked with: " + baked.light.name);
   }
+  const Outcome<void> chosen = choose_lightmap(options, bytes, baked);
+  if (!chosen) return tl::make_unexpected(chosen.error());
   Threads threads;
   const StopTogether together(session.interrupt, threads);
   const Places places = place_points(baked.scene, points, threads);

@@ -40,6 +40,16 @@ LightValue light_value(const Scene& scene, const SurfaceMatch& place, const Vec3
           error * std::numbers::pi, albedo * error};
 }
 
+/// What an artefact shows at a place: its lightmap, where it has one there, or its vertices.
+Vec3f shown_at(const BakedScene& baked, const TrianglePoint& point, std::uint32_t triangle,
+               std::span<const Vec3f> light) {
+  const Mesh& mesh = baked.scene.mesh;
+  if (baked.lightmap.side == 0 || baked.lightmap.parts[mesh.part[triangle]] == 0)
+    return value_at(baked.transfer, point, light);
+  const auto& [a, b, c] = point.triangle;
+  return baked.lightmap.at(mesh.uv1[a] * (1 - point.u - point.v) + mesh.uv1[b] * point.u + mesh.uv1[c] * point.v);
+}
+
 /// The side of the face on which the shading normal lies is the side that is lit.
 ReferencePoint reference_point(const Scene& scene, const SurfaceMatch& place) {
   const Vec3f normal = to_float(match_normal(scene.mesh, place));
@@ -171,7 +181,7 @@ std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& p
     }
     const TrianglePoint point{baked.scene.mesh.triangles[place->triangle], static_cast<float>(place->u),
                               static_cast<float>(place->v)};
-    const Vec3d value = to_double(value_at(baked.transfer, point, light));
+    const Vec3d value = to_double(shown_at(baked, point, place->triangle, light));
     out.push_back(light_value(baked.scene, *place, value, {}, options.scene_albedo));
     const Vec3d* view = view_of(options, out.size() - 1);
     if (!view) continue;

@@ -33,7 +33,8 @@ struct LookupOptions {
   std::span<const QueryPoint> points = {};  // none, or one for each place
 };
 
-/// Values under the distant light `light` (SH of the artefact's order, or empty) and the scene's own lamps.
+/// Values under the distant light `light` (SH of the artefact's order, or empty) and the scene's own lamps; where the
+/// scene has a lightmap, those of that.
 std::vector<LightValue> artefact_values(const BakedScene&, const Places&, std::span<const Vec3f> light,
                                         const LookupOptions&);
 

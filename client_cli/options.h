@@ -79,6 +79,7 @@ struct EvalOptions {
   LightOptions light;
   std::string lamp;       // of --light; empty: none
   bool indirect = false;  // with a lamp: reflected light only
+  bool lightmap = false;
   bool scene_albedo = false;
   int sh_order = 0;
 };

@@ -60,9 +60,26 @@ std::string vertices_text(const json& certificate) {
   if (certificate.contains("seen") && certificate["seen"].is_object())
     out += "\nwhere it can be seen (" + count(number_of(certificate["seen"], "points")) +
            " points): " + error_text(certificate["seen"]);
-  if (certificate.contains("job_light") && certificate["job_light"].is_object())
+  if (certificate.contains("job_light") && certificate["job_light"].is_object()) {
+    constexpr double kMuch = 0.5;  // of the mean light: shadows are in the wrong place, and what is dark looks black
     out += "\nunder the job's own light in full: " + error_text(certificate["job_light"]);
+    if (number_of(certificate["job_light"], "relrmse") > std::max(kMuch, 2 * number_of(certificate, "relrmse")))
+      out +=
+          "\nits bands are too few for what the sky has of detail here, as a sun through a window; the step radiosity "
+          "bakes one light in full";
+  }
   return out;
+}
+
+/// What reduction cost, where it changed the model.
+std::string reduction_text(const json& document) {
+  const json reduce = document.value("reduce", json());
+  if (!reduce.is_object() || reduce.value("unchanged", false) || !reduce.contains("error")) return {};
+  constexpr double kFar = 0.01;  // of the diagonal: seen at a glance
+  const double rms = number_of(reduce["error"], "rms");
+  return "the model is " + percent_text(rms) + " of its diagonal from the reduced surface (RMS), " +
+         percent_text(number_of(reduce["error"], "max")) + " where it is farthest" +
+         (rms > kFar ? "; it needs more triangles than that: \"triangles\" of the step reduce" : "");
 }
 
 std::string prediction_text(const json& plan) {
@@ -108,7 +125,9 @@ std::string certificate_text(std::string_view report) {
   if (lightmap.is_object())
     out += (out.empty() ? "" : "\n") + std::string("of the lightmap, at ") + count(number_of(lightmap, "points")) +
            " points that can be seen: " + error_text(lightmap) + "; its 8-bit image: " + error_text(lightmap["image"]);
-  if (out.empty()) return {};
+  std::string reduced = reduction_text(document);
+  if (out.empty()) return reduced;
+  if (!reduced.empty()) out = reduced + "\n" + out;
   const json levels = document.contains("lightfield") ? list_of(document["lightfield"], "levels") : json::array();
   for (const json& level : levels) {
     if (!level.contains("certificate") || !level["certificate"].is_object()) continue;

@@ -16,7 +16,8 @@ std::string plan_text(std::string_view json);
 /// What the input has and the bake did not honour, a sentence each.
 std::vector<std::string> report_warnings(std::string_view report_json);
 
-/// "error 1.2 % (95 % interval 1.0 .. 1.5 %), ..." of a report's certificate; empty when it has none.
+/// "error 1.2 % (95 % interval 1.0 .. 1.5 %), ..." of a report's certificate, and how far a reduced model is off; empty
+/// when it has neither.
 std::string certificate_text(std::string_view report_json);
 
 /// What became of a promised error or time, and where the error comes from; empty when nothing was promised.

@@ -8,9 +8,11 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
@@ -48,36 +50,83 @@ bool is_simple_scanline(Span file) {
   return file.size() >= 8 && file[4] == 2 && (file[5] & kForbidden) == 0;
 }
 
-Result<Environment> read_pixels(Span file, const std::string& name) {
-  MemoryStream stream(file);
-  Imf::InputFile input(stream, 1);
+std::int64_t width_of(const Imath::Box2i& w) { return std::int64_t{w.max.x} - w.min.x + 1; }
+std::int64_t height_of(const Imath::Box2i& w) { return std::int64_t{w.max.y} - w.min.y + 1; }
+
+bool allowed(const Imath::Box2i& w) {
+  return width_of(w) >= 1 && height_of(w) >= 1 && width_of(w) <= kMaxEnvironmentWidth &&
+         height_of(w) <= kMaxEnvironmentHeight;
+}
+
+bool has_full(const Imf::ChannelList& channels, const char* name) {
+  const Imf::Channel* found = channels.findChannel(name);
+  return found && found->xSampling == 1 && found->ySampling == 1;
+}
+
+/// Channels of red, green and blue: all of them Y in a grey picture. Nothing where there are none.
+std::optional<std::array<const char*, 3>> colour_channels(const Imf::ChannelList& channels) {
+  if (has_full(channels, "R") && has_full(channels, "G") && has_full(channels, "B")) return {{"R", "G", "B"}};
+  const bool grey = has_full(channels, "Y") && !channels.findChannel("RY") && !channels.findChannel("BY");
+  if (grey) return {{"Y", "Y", "Y"}};
+  return std::nullopt;
+}
+
+/// The pixels of the data window, row by row.
+std::vector<Vec3f> read_window(Imf::InputFile& input, const std::array<const char*, 3>& names) {
   const Imath::Box2i window = input.header().dataWindow();
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
-                     height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width < 1 || height < 1 || width > kMaxEnvironmentWidth || height > kMaxEnvironmentHeight) {
-    return fault(
-        "image_too_large",
-        std::to_string(width) + " x " + std::to_string(height) + " pixels; an environment may have 8192 x 4096.", name);
-  }
-  for (const char* channel : {"R", "G", "B"}) {
-    const Imf::Channel* found = input.header().channels().findChannel(channel);
-    if (!found || found->xSampling != 1 || found->ySampling != 1) {
-      return fault("exr_unsupported", "The picture must have full channels named R, G and B.", name);
-    }
-  }
-  Environment out{.name = name, .width = static_cast<int>(width), .height = static_cast<int>(height), .radiance = {}};
-  out.radiance.resize(static_cast<std::size_t>(width * height));
-  char* base = reinterpret_cast<char*>(out.radiance.data()) -
+  const std::int64_t width = width_of(window);
+  std::vector<Vec3f> out(static_cast<std::size_t>(width * height_of(window)));
+  char* base = reinterpret_cast<char*>(out.data()) -
                (window.min.x + window.min.y * width) * static_cast<std::int64_t>(sizeof(Vec3f));
+  const bool grey = names[0] == names[1];
   Imf::FrameBuffer frame;
-  const char* names[] = {"R", "G", "B"};
-  for (std::size_t c = 0; c < 3; ++c) {
+  for (std::size_t c = 0; c < (grey ? 1U : 3U); ++c) {
     frame.insert(names[c], Imf::Slice(Imf::FLOAT, base + c * sizeof(float), sizeof(Vec3f),
                                       static_cast<std::size_t>(width) * sizeof(Vec3f)));
   }
   input.setFrameBuffer(frame);
   input.readPixels(window.min.y, window.max.y);
+  if (grey) {
+    for (Vec3f& p : out) p = {p.x, p.x, p.x};
+  }
   return out;
+}
+
+/// What a data window shows of the picture, which is the display window: black where it has nothing.
+std::vector<Vec3f> placed(const std::vector<Vec3f>& pixels, const Imath::Box2i& data, const Imath::Box2i& display) {
+  if (data == display) return pixels;
+  const std::int64_t width = width_of(display);
+  std::vector<Vec3f> out(static_cast<std::size_t>(width * height_of(display)));
+  const std::int64_t left = std::max(data.min.x, display.min.x), right = std::min(data.max.x, display.max.x);
+  for (std::int64_t y = std::max(data.min.y, display.min.y); y <= std::min(data.max.y, display.max.y); ++y) {
+    if (left > right) break;
+    const auto from = pixels.begin() + (y - data.min.y) * width_of(data) + (left - data.min.x);
+    std::copy_n(from, right - left + 1, out.begin() + (y - display.min.y) * width + (left - display.min.x));
+  }
+  return out;
+}
+
+Result<Environment> read_pixels(Span file, const std::string& name) {
+  MemoryStream stream(file);
+  Imf::InputFile input(stream, 1);
+  const Imf::Header& header = input.header();
+  const Imath::Box2i data = header.dataWindow(), display = header.displayWindow();
+  if (!allowed(data) || !allowed(display)) {
+    return fault("image_too_large",
+                 std::to_string(width_of(data)) + " x " + std::to_string(height_of(data)) + " pixels in " +
+                     std::to_string(width_of(display)) + " x " + std::to_string(height_of(display)) +
+                     "; an environment may have 8192 x 4096.",
+                 name);
+  }
+  if (Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE)
+    return fault("exr_unsupported", "The picture is a cube map; save it as latitude and longitude.", name);
+  const auto names = colour_channels(header.channels());
+  if (!names)
+    return fault("exr_unsupported", "The picture must have full channels named R, G and B, or Y alone.", name);
+  return Environment{.name = name,
+                     .width = static_cast<int>(width_of(display)),
+                     .height = static_cast<int>(height_of(display)),
+                     .radiance = placed(read_window(input, *names), data, display)};
 }
 
 constexpr const char* kChannels[] = {"R", "G", "B", "A"};

@@ -7,18 +7,38 @@
 namespace kiln::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 10> kHonoured{
+constexpr std::array<std::string_view, 9> kHonoured{
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization",
     "KHR_texture_transform",      "KHR_lights_punctual",     "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing", "KHR_materials_pbrSpecularGlossiness",
-    "KILN_radiance_functions"};
+    "KHR_materials_unlit",        "EXT_mesh_gpu_instancing", "KILN_radiance_functions"};
 
-/// Without effect on diffuse light, so not worth a word.
-constexpr std::array<std::string_view, 4> kHarmless{"KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_materials_ior",
-                                                    "KHR_materials_specular"};
+/// Without effect on light, so not worth a word.
+constexpr std::array<std::string_view, 2> kHarmless{"KHR_xmp_json_ld", "KHR_animation_pointer"};
+
+/// Read, but baked as something simpler.
+struct Simplified {
+  std::string_view name;
+  const char *code, *message;
+};
+constexpr std::array<Simplified, 3> kSimplified{
+    {{"KHR_materials_pbrSpecularGlossiness", "specular_glossiness_as_diffuse",
+      "Specular-glossiness materials are baked by their diffuse colour."},
+     {"KHR_materials_ior", "reflectance_ignored",
+      "Dielectrics are baked with the reflectance 0.04 at normal incidence, whatever KHR_materials_ior says."},
+     {"KHR_materials_specular", "reflectance_ignored",
+      "Dielectrics are baked with the reflectance 0.04 at normal incidence, whatever KHR_materials_specular says."}}};
 
 bool contains(const auto& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+const Simplified* simplified(const std::string& name) {
+  const auto found = std::ranges::find(kSimplified, name, &Simplified::name);
+  return found == kSimplified.end() ? nullptr : &*found;
+}
+
+bool accepted(const std::string& name) {
+  return contains(kHonoured, name) || contains(kHarmless, name) || simplified(name) != nullptr;
 }
 
 /// Names come from the file: only what may stand in an extension's name is repeated.
@@ -35,16 +55,14 @@ std::string printable(const std::string& name) {
 void check_extensions(const std::vector<std::string>& used, const std::vector<std::string>& required,
                       Findings& findings) {
   for (std::size_t i = 0; i < required.size(); ++i) {
-    if (contains(kHonoured, required[i]) || contains(kHarmless, required[i])) continue;
+    if (accepted(required[i])) continue;
     findings.fail("unsupported_extension", "The file requires " + printable(required[i]) + ", which is not supported.",
                   "/extensionsRequired/" + std::to_string(i));
   }
   for (const std::string& name : used) {
-    if (name == "KHR_materials_pbrSpecularGlossiness") {
-      findings.warn("specular_glossiness_as_diffuse",
-                    "Specular-glossiness materials are baked by their diffuse colour.");
-    }
-    if (!contains(kHonoured, name) && !contains(kHarmless, name)) {
+    if (const Simplified* known = simplified(name)) {
+      findings.warn(known->code, known->message);
+    } else if (!accepted(name)) {
       findings.warn("extension_ignored", "The file uses " + printable(name) + ", which has no effect on the bake.");
     }
   }

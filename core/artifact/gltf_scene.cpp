@@ -33,6 +33,18 @@ void warn_of_rest_pose(const Document& d, Findings& findings) {
   }
 }
 
+/// Not where the file brings its light along: then nothing falls on its materials.
+void warn_of_unlit(const Document& d, const std::vector<RawPart>& parts, Findings& findings) {
+  const auto unlit = [&](const RawPart& p) {
+    return p.material >= 0 && d.materials[static_cast<std::size_t>(p.material)].unlit;
+  };
+  const auto found = std::find_if(parts.begin(), parts.end(), unlit);
+  if (d.radiance || found == parts.end()) return;
+  findings.warn("unlit_as_diffuse",
+                "Unlit materials are baked like others: light falls on them, and they reflect their base colour of it.",
+                "/materials/" + std::to_string(found->material));
+}
+
 /// For a scene in which no primitive with surface stands.
 std::string why_empty(const Document& d) {
   bool surface = false, any = false;
@@ -187,6 +199,7 @@ LitScene import_gltf(const GltfContainer& container, const GltfImport& in, Findi
   scene.textures = document.textures;
   scene.images = load_images(document, bytes, in.files, limits, findings);
   if (parts.parts.empty()) findings.fail("empty_scene", why_empty(document));
+  warn_of_unlit(document, parts.parts, findings);
   add_default_material(scene, parts.parts);
   if (findings.failed()) return lit;
   lit.field.degree = static_cast<int>(document.radiance.degree);

@@ -35,6 +35,17 @@ bool has_few_scans(std::span<const std::uint8_t> file) {
   return scans <= kMaxScans;
 }
 
+/// CMYK without profiles to RGB, in place. Writers that leave Adobe's marker store ink upside down: 255 is none.
+void rgba_from_cmyk(std::uint8_t* pixels, std::uint64_t count, bool upside_down) {
+  for (std::uint8_t* p = pixels; p != pixels + 4 * count; p += 4) {
+    const auto left = [&](int c) { return static_cast<unsigned>(upside_down ? p[c] : 255 - p[c]); };
+    const unsigned paper = left(3);
+    for (int c = 0; c < 3; ++c) p[c] = static_cast<std::uint8_t>((left(c) * paper + 127) / 255);
+    p[3] = 255;
+  }
+}
+
+/// Exif is not looked at: glTF demands that pictures are taken as they are stored, not as they should be turned.
 /// No object with a destructor lives here: errors come back by longjmp.
 bool read_rows(jpeg_decompress_struct& info, Errors& errors, std::span<const std::uint8_t> file,
                const ImageHeader& header, std::uint8_t* rgba) {
@@ -43,11 +54,13 @@ bool read_rows(jpeg_decompress_struct& info, Errors& errors, std::span<const std
   jpeg_mem_src(&info, file.data(), file.size());
   jpeg_read_header(&info, TRUE);
   if (info.image_width != header.width || info.image_height != header.height) return false;
-  info.out_color_space = JCS_EXT_RGBA;
+  const bool inks = info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK;
+  info.out_color_space = inks ? JCS_CMYK : JCS_EXT_RGBA;
   jpeg_start_decompress(&info);
   while (info.output_scanline < info.output_height) {
     JSAMPROW row = rgba + std::uint64_t{info.output_scanline} * header.width * 4;
     jpeg_read_scanlines(&info, &row, 1);
+    if (inks) rgba_from_cmyk(row, header.width, info.saw_Adobe_marker == TRUE);
   }
   return !errors.cut_off;
 }

@@ -20,10 +20,11 @@ void read_bytes(png_structp png, png_bytep out, std::size_t n) {
 [[noreturn]] void leave(png_structp png, png_const_charp) { png_longjmp(png, 1); }
 void ignore(png_structp, png_const_charp) {}
 
-/// Any colour type and depth to 8-bit RGBA.
+/// Any colour type and depth to 8-bit RGBA; 16 bits are rounded. gAMA, cHRM, sRGB and profiles are not looked at, as
+/// glTF demands.
 void ask_for_rgba(png_structp png) {
   png_set_expand(png);
-  png_set_strip_16(png);
+  png_set_scale_16(png);
   png_set_gray_to_rgb(png);
   png_set_add_alpha(png, 0xFF, PNG_FILLER_AFTER);
 }

@@ -98,7 +98,8 @@ bool lower(pid_t pid, Resource resource, rlimit wanted) {
   return ::prlimit(pid, resource, &wanted, nullptr) == 0;
 }
 
-/// From outside, so that it holds for every program that may be the worker.
+/// From outside, so that it holds for every program that may be the worker. It may run for some milliseconds by then:
+/// time, files and memory that it used before count all the same.
 bool limit(pid_t pid, const WorkerStart& start) {
   bool set = lower(pid, RLIMIT_CORE, {0, 0}) && lower(pid, RLIMIT_NOFILE, {kMaxFiles, kMaxFiles});
   if (start.cpu_s > 0) {

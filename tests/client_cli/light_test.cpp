@@ -9,6 +9,7 @@
 #include "client_cli/csv.h"
 #include "client_cli/values.h"
 #include "tests/client_cli/run_kiln.h"
+#include "tests/core/artifact/gltf_samples.h"
 
 namespace kiln {
 namespace {
@@ -249,6 +250,40 @@ TEST_F(Light, AGridIsAskedAsAnArtefactIsAndAgreesWithTheReflectedLightOfTheRefer
   const json facts = json::parse(run_kiln({"inspect", grid, "--json"}).out);
   EXPECT_EQ(facts["kind"], "grid");
   EXPECT_EQ(facts["grid"]["size"], (std::vector<int>{10, 10, 10}));
+}
+
+/// A black floor of four vertices under a lid, and a layout for a lightmap.
+std::string floor_and_lid() {
+  test::Sample s;
+  s.positions({-2, 0, 2, 2, 0, 2, 2, 0, -2, -2, 0, -2, -.5F, .4F, .5F, .5F, .4F, .5F, .5F, .4F, -.5F, -.5F, .4F, -.5F});
+  const std::vector<float> uv{.02F, .98F, .6F, .98F, .6F, .4F, .02F, .4F, .7F, .2F, .85F, .2F, .85F, .05F, .7F, .05F};
+  s.accessor(uv, 5126, "VEC2", 8);
+  s.indices({0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7});
+  const Bytes glb =
+      s.glb(test::one_node("\"attributes\":{\"POSITION\":0,\"TEXCOORD_1\":1},\"indices\":2,\"material\":0") +
+            ",\"materials\":[{\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[0,0,0,1]}}]");
+  return {glb.begin(), glb.end()};
+}
+
+TEST_F(Light, ALightmapIsAskedApartFromTheVerticesBesideIt) {
+  const std::string model = folder.write("lid.glb", floor_and_lid()), artefact = folder.path("out/scene.glb");
+  const std::string recipe = folder.write(
+      "r.json", R"({"steps":[{"do":"radiosity","deliver":["lightmap"],"lightmap":{"size":128}}],"quality":"draft",)"
+                R"("environment":{"constant":[1,1,1]}})");
+  const Ran baked = run_kiln({"bake", model, "-r", recipe, "-o", folder.path("out")});
+  ASSERT_EQ(baked.exit, 0) << baked.err;
+  const std::string points = folder.write("q.csv", "x,y,z,nx,ny,nz\n0,0,0,0,1,0\n1.8,0,1.8,0,1,0\n");
+  const ValueTable truth = values({"reference", model, "--points", points, "--env", "1,1,1", "--samples", "4096"});
+  const ValueTable map = values({"eval", artefact, "--points", points, "--lightmap"});
+  const ValueTable vertices = values({"eval", artefact, "--points", points});
+  ASSERT_EQ(truth.values.size(), 2U);
+  ASSERT_LT(truth.values[0].irradiance.y, 0.7 * kPi);
+  for (const std::size_t i : {0U, 1U})  // a step of its 8 bits, noise of 128 rays a texel: 5 % together
+    EXPECT_NEAR(map.values[i].irradiance.y, truth.values[i].irradiance.y, 0.05 * kPi);
+  EXPECT_GT(vertices.values[0].irradiance.y, truth.values[0].irradiance.y + 0.1 * kPi) << "four corners see no lid";
+  EXPECT_EQ(run_kiln({"eval", artefact, "--points", points, "--lightmap", "--env", "1,1,1"}).exit, 2);
+  ASSERT_EQ(run_kiln({"bake", scene, "--quality", "draft", "-o", folder.path("plain")}).exit, 0);
+  EXPECT_EQ(run_kiln({"eval", folder.path("plain/scene.glb"), "--points", points, "--lightmap"}).exit, 2);
 }
 
 TEST_F(Light, ALampThatMovesIsAskedOfLinksAndAgreesWithTheReference) {

@@ -2,6 +2,7 @@
 
 #include "client_cli/progress_bar.h"
 #include "client_cli/recipe_input.h"
+#include "client_cli/report_text.h"
 #include "client_cli/terminal.h"
 #include "tests/client_cli/run_kiln.h"
 
@@ -16,6 +17,27 @@ TEST(Talk, QuantitiesReadWell) {
   EXPECT_EQ(human_seconds(3.21), "3.2 s");
   EXPECT_EQ(human_seconds(75), "1 min 15 s");
   EXPECT_EQ(human_seconds(7260), "2 h 1 min");
+}
+
+TEST(Talk, AReducedModelThatIsFarOffIsSaidAndNeedsMoreTriangles) {
+  const auto text = [](const std::string& rms) {
+    return certificate_text(R"({"certificate":null,"reduce":{"unchanged":false,"error":{"rms":)" + rms +
+                            R"(,"max":0.5}}})");
+  };
+  EXPECT_NE(text("0.285").find("28.5 %"), std::string::npos);
+  EXPECT_NE(text("0.285").find("more triangles"), std::string::npos);
+  EXPECT_NE(text("0.0006").find("0.06 %"), std::string::npos);
+  EXPECT_EQ(text("0.0006").find("more triangles"), std::string::npos);
+  EXPECT_EQ(certificate_text(R"({"certificate":null,"reduce":{"unchanged":true,"error":{"rms":0,"max":0}}})"), "");
+}
+
+TEST(Talk, LightTooSharpForTheBandsIsSaid) {
+  const auto text = [](const std::string& transport, const std::string& full) {
+    return certificate_text(R"({"certificate":{"relrmse":)" + transport + R"(,"job_light":{"relrmse":)" + full + "}}}");
+  };
+  EXPECT_NE(text("0.05", "2.64").find("bands are too few"), std::string::npos);
+  EXPECT_EQ(text("0.05", "0.12").find("bands are too few"), std::string::npos);
+  EXPECT_EQ(text("0.6", "0.7").find("bands are too few"), std::string::npos) << "there it is the bake that is off";
 }
 
 TEST(Talk, AProgressLineNamesStagePercentTimeAndError) {

@@ -42,7 +42,7 @@ const Asset kAssets[] = {
     {"SpheresScaledInstances/spheres_scaled_instances.gltf", 672},
     {"TextureTransformTest/TextureTransformTest.gltf", 24},
     {"TriangleWithoutIndices/TriangleWithoutIndices.gltf", 1},
-    {"UnlitTest/UnlitTest.gltf", 88},
+    {"UnlitTest/UnlitTest.gltf", 88, "", "unlit_as_diffuse"},
     {"VertexColorTest/VertexColorTest.gltf", 36},
     {"embedded/BoxTextured.gltf", 12},
     {"multi-scene/scene.gltf", 0, "unknown_enum"},  // a light of type "ambient", which the extension does not have

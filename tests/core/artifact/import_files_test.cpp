@@ -4,6 +4,7 @@
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <numeric>
 
 #include "tests/core/artifact/gltf_samples.h"
 
@@ -168,21 +170,29 @@ TEST(ImportEnvironment, BrokenHdrFilesAreRefused) {
   }
 }
 
-/// An EXR of random floats or halves in a data window off the origin.
-Bytes make_exr(const std::vector<float>& rgb, int width, int height, bool half_pixels) {
+struct ExrForm {
+  std::vector<std::string> channels{"R", "G", "B"};
+  Imath::Box2i data, display;
+  bool half_pixels = false;
+  bool cube = false;
+};
+
+/// An EXR of these values, channel after channel of a pixel.
+Bytes make_exr(const std::vector<float>& values, const ExrForm& form) {
   const fs::path path = fs::temp_directory_path() / ("kiln-test-" + std::to_string(::getpid()) + ".exr");
-  const Imath::Box2i window({5, -3}, {5 + width - 1, -3 + height - 1});
-  Imf::Header header(window, window);
-  std::vector<Imath::half> halves(rgb.begin(), rgb.end());
+  Imf::Header header(form.display, form.data);
+  if (form.cube) Imf::addEnvmap(header, Imf::ENVMAP_CUBE);
+  std::vector<Imath::half> halves(values.begin(), values.end());
   Imf::FrameBuffer frame;
-  const std::size_t size = half_pixels ? 2 : 4;
-  char* base =
-      half_pixels ? reinterpret_cast<char*>(halves.data()) : reinterpret_cast<char*>(const_cast<float*>(rgb.data()));
-  base -= (5 + -3 * width) * static_cast<std::ptrdiff_t>(3 * size);
-  for (const auto& [name, c] : {std::pair{"R", 0U}, {"G", 1U}, {"B", 2U}}) {
-    header.channels().insert(name, Imf::Channel(half_pixels ? Imf::HALF : Imf::FLOAT));
-    frame.insert(name, Imf::Slice(half_pixels ? Imf::HALF : Imf::FLOAT, base + c * size, 3 * size,
-                                  3 * size * static_cast<std::size_t>(width)));
+  const int width = form.data.max.x - form.data.min.x + 1, height = form.data.max.y - form.data.min.y + 1;
+  const std::size_t size = form.half_pixels ? 2 : 4, step = form.channels.size() * size;
+  char* base = form.half_pixels ? reinterpret_cast<char*>(halves.data())
+                                : reinterpret_cast<char*>(const_cast<float*>(values.data()));
+  base -= (form.data.min.x + form.data.min.y * width) * static_cast<std::ptrdiff_t>(step);
+  const Imf::PixelType type = form.half_pixels ? Imf::HALF : Imf::FLOAT;
+  for (std::size_t c = 0; c < form.channels.size(); ++c) {
+    header.channels().insert(form.channels[c], Imf::Channel(type));
+    frame.insert(form.channels[c], Imf::Slice(type, base + c * size, step, step * static_cast<std::size_t>(width)));
   }
   {
     Imf::OutputFile out(path.c_str(), header);
@@ -195,6 +205,12 @@ Bytes make_exr(const std::vector<float>& rgb, int width, int height, bool half_p
   return bytes;
 }
 
+/// Both windows off the origin, and the same.
+Bytes make_exr(const std::vector<float>& rgb, int width, int height, bool half_pixels) {
+  const Imath::Box2i window({5, -3}, {5 + width - 1, -3 + height - 1});
+  return make_exr(rgb, {.data = window, .display = window, .half_pixels = half_pixels});
+}
+
 TEST(ImportEnvironment, ExrOfHalvesAndFloatsComesBackExactly) {
   const std::vector<float> rgb{1, 2, 3, 0.5F, 0.25F, 8, 100, 0, 1024, 6, 7, 8, 0, 0, 0, 1, 1, 1};
   for (const bool halves : {false, true}) {
@@ -204,6 +220,46 @@ TEST(ImportEnvironment, ExrOfHalvesAndFloatsComesBackExactly) {
     EXPECT_EQ(e->height, 2);
     for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(e->radiance[i], (Vec3f{rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]}));
   }
+}
+
+/// OpenEXR, "Technical Introduction": the display window is the picture, the data window what of it is in the file.
+TEST(ImportEnvironment, TheDataWindowOfAnExrLiesWhereItSaysInTheDisplayWindow) {
+  const auto grey = [](const ExrForm& form, const std::vector<float>& values) {
+    const auto e = import_environment(make_exr(values, form), "a.exr");
+    std::vector<float> red;
+    if (e) {
+      for (const Vec3f& p : e->radiance) red.push_back(p.x);
+    }
+    return std::pair(e ? e->width : 0, red);
+  };
+  const Imath::Box2i part({1, 1}, {2, 1}), whole({0, 0}, {3, 2}), apart({7, 7}, {8, 7});
+  EXPECT_EQ(grey({.channels = {"Y"}, .data = part, .display = whole}, {5, 6}),
+            std::pair(4, std::vector<float>{0, 0, 0, 0, 0, 5, 6, 0, 0, 0, 0, 0}));
+  std::vector<float> count(12);
+  std::iota(count.begin(), count.end(), 1.0F);
+  EXPECT_EQ(grey({.channels = {"Y"}, .data = whole, .display = part}, count), std::pair(2, std::vector<float>{6, 7}));
+  EXPECT_EQ(grey({.channels = {"Y"}, .data = apart, .display = part}, {5, 6}), std::pair(2, std::vector<float>{0, 0}));
+}
+
+TEST(ImportEnvironment, ExrMayBeGreyOrHaveAlphaAndIsNoCube) {
+  const Imath::Box2i window({0, 0}, {1, 0});
+  const auto grey = import_environment(
+      make_exr({3, .5F, 4, .5F}, {.channels = {"Y", "A"}, .data = window, .display = window}), "a.exr");
+  ASSERT_TRUE(grey) << grey.error().message;
+  EXPECT_EQ(grey->radiance, (std::vector<Vec3f>{{3, 3, 3}, {4, 4, 4}}));
+  const auto alpha = import_environment(
+      make_exr({1, 2, 3, .5F, 4, 5, 6, 0}, {.channels = {"R", "G", "B", "A"}, .data = window, .display = window}),
+      "a.exr");
+  ASSERT_TRUE(alpha) << alpha.error().message;
+  EXPECT_EQ(alpha->radiance, (std::vector<Vec3f>{{1, 2, 3}, {4, 5, 6}}));
+  const auto without =
+      import_environment(make_exr({1, 2, 3, 4}, {.channels = {"R", "G"}, .data = window, .display = window}), "a.exr");
+  ASSERT_FALSE(without);
+  EXPECT_EQ(without.error().code, "exr_unsupported");
+  const auto cube = import_environment(
+      make_exr({1, 2}, {.channels = {"Y"}, .data = window, .display = window, .cube = true}), "a.exr");
+  ASSERT_FALSE(cube);
+  EXPECT_EQ(cube.error().code, "exr_unsupported");
 }
 
 TEST(ImportEnvironment, LightThatIsNotFiniteNamesItsPixelAndNegativeLightIsNone) {

@@ -31,7 +31,8 @@ struct Blow {
   int error = 0;  // of the call that fails; 0: the process is killed after it
   bool power_cut = false;
 };
-inline constexpr Blow kBlows[] = {{"kill"}, {"power cut", 0, true}, {"EIO", EIO}};
+/// EINTR strikes only calls that a signal interrupts (open, write, pread), and is no failure: they are made again.
+inline constexpr Blow kBlows[] = {{"kill"}, {"power cut", 0, true}, {"EIO", EIO}, {"ENOSPC", ENOSPC}, {"EINTR", EINTR}};
 
 /// Of all pairs of blows one in `otherwise` is tried; with KILN_SOAK in the environment every one.
 inline int pair_stride(int otherwise) { return std::getenv("KILN_SOAK") != nullptr ? 1 : otherwise; }
@@ -62,18 +63,18 @@ class FaultyFiles : public FileLayer {
  public:
   int calls = 0;
   int kill_at = -1;  // this call is done, then nothing any more
-  int fail_at = -1;  // this call fails with `error` and does nothing
+  int fail_at = -1;  // this call fails with `error` and does nothing; with EINTR only if it can be interrupted
   int error = EIO;
   bool interrupt = false;  // every first try of open, write and pread is interrupted
   bool short_writes = false;
-  std::string failed_call;
+  std::string failed_call;  // none when it was interrupted
 
   ~FaultyFiles() override { restart(); }
   /// The next process on the same files. The kernel closes what the dead one had open.
   void restart() {
     for (const auto& [fd, path] : paths_) ::close(fd);
     paths_.clear();
-    dead_ = false;
+    dead_ = struck_ = false;
     kill_at = fail_at = -1;
     failed_call.clear();
   }
@@ -82,7 +83,7 @@ class FaultyFiles : public FileLayer {
     error = blow.error;
     (blow.error == 0 ? kill_at : fail_at) = calls + call;
   }
-  bool struck() const { return dead_ || !failed_call.empty(); }
+  bool struck() const { return dead_ || struck_; }
   /// Somebody else wrote this file, and synced nothing.
   void written_by_another(const std::string& path) {
     unsynced_bytes_[path] = 0;
@@ -209,8 +210,9 @@ class FaultyFiles : public FileLayer {
     if (dead_) return fail<T>(EIO);
     const int number = calls++;
     if (number == fail_at) {
-      failed_call = name;
-      return fail<T>(error);
+      struck_ = true;
+      if (error != EINTR) failed_call = name;
+      if (error != EINTR || interruptible) return fail<T>(error);
     }
     if (interrupt && interruptible && (interrupted_ = !interrupted_)) return fail<T>(EINTR);
     const T result = call();
@@ -224,7 +226,7 @@ class FaultyFiles : public FileLayer {
     return -1;
   }
 
-  bool dead_ = false, interrupted_ = false;
+  bool dead_ = false, struck_ = false, interrupted_ = false;
   std::map<int, std::string> paths_;
   std::map<std::string, std::uintmax_t> unsynced_bytes_;  // path, and how many of its bytes were synced
   std::vector<Entry> unsynced_entries_;

@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "tests/fixtures/cutting_proxy.h"
 #include "tests/fixtures/postgres_server.h"
 #include "tests/server/jobs/store_conformance.h"
 
@@ -195,6 +196,63 @@ TEST_F(PostgresStoreTest, CutsInTheMiddleOfManyWritesLoseNoAcknowledgedJob) {
   for (const std::string& id : acknowledged) EXPECT_TRUE(store_->get(id)) << id;
   EXPECT_EQ(acknowledged.size(), 60U);
   std::printf("{\"acknowledged\":%zu,\"refused\":%d}\n", acknowledged.size(), refused);
+}
+
+/// Asks for a job as a client does, until it is acknowledged.
+std::string create_patiently(JobStore& store, NewJob job) {
+  job.idempotency_key = job.content_key;
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    const auto created = store.create(job);
+    if (created) return created->job.id;
+    std::this_thread::sleep_for(100ms);  // who could not connect is not asked again sooner
+  }
+  return {};
+}
+
+/// Works as a server does until the job has ended; a claim whose answer was lost comes back when its lease is over.
+/// Returns how many commits were acknowledged.
+int work_patiently(JobStore& store, const std::string& id, TestClock& clock) {
+  int acknowledged = 0;
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    clock.now_ms += 120'000;
+    const auto job = store.get(id);
+    if (job && is_terminal(job->state)) break;
+    static_cast<void>(store.reap());
+    const auto claim = store.claim(60s, {});
+    if (!claim || !*claim) continue;
+    static_cast<void>(store.heartbeat((*claim)->ref, 60s, JobProgress{"bake", 1, 2, .5, {}}));
+    const auto wrote =
+        store.commit((*claim)->ref, std::vector{Artifact{"scene.glb", "x", std::string(64, 'e'), 1}}, false);
+    acknowledged += wrote && *wrote == Wrote::done ? 1 : 0;
+  }
+  return acknowledged;
+}
+
+TEST_F(PostgresStoreTest, ACutInEveryStatementOfAJobsLifeLosesAndDoublesNothing) {
+  CuttingProxy proxy(server().folder(), PostgresServer::kPort);
+  TestClock clock;
+  const auto cut =
+      open_postgres_store({PostgresServer::address(proxy.folder()), [&clock] { return clock.now_ms; }}).value();
+  int jobs = 0;
+  for (const Cut how : {Cut::before, Cut::after}) {
+    for (int statement = 0; proxy.has_cut() || statement == 0; ++statement) {
+      SCOPED_TRACE((how == Cut::before ? "before statement " : "after statement ") + std::to_string(statement));
+      proxy.cut(how, statement);
+      const std::string id = create_patiently(*cut, new_job(jobs++));
+      ASSERT_TRUE(store_->get(id));
+      const int acknowledged = work_patiently(*cut, id, clock);
+      const Job job = store_->get(id).value();
+      ASSERT_EQ(job.state, JobState::succeeded);
+      EXPECT_EQ(job.artifacts.size(), 1U);
+      EXPECT_LE(acknowledged, 1);
+      EXPECT_LE(job.attempt, 2);
+      const auto events = store_->events_after(0, id, 100).value();
+      EXPECT_EQ(std::ranges::count(events, EventKind::done, &JobEvent::kind), 1);
+      EXPECT_EQ(store_->counts()->succeeded, static_cast<std::uint64_t>(jobs));
+      ASSERT_LT(statement, 100);
+    }
+  }
+  std::printf("{\"cuts\":%d}\n", jobs - 2);
 }
 
 TEST_F(PostgresStoreTest, AServerThatStallsForTenSecondsIsWaitedFor) {
