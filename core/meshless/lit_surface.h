@@ -4,7 +4,7 @@
 // Table    as fine as that of senders.h, with the mean of rho over each entry: a hit costs one read, and sees a texture
 //          no sharper than the light on it. Where hits look for themselves (senders.h) an entry has what its middle
 //          finds. Where there is no entry, and on paths, rho is that of the hit.
-// Memory   16 bytes a cell
+// Memory   16 bytes a cell, 256 more for one in parts
 // Units   W m^-2 sr^-1; `light` of a sender is irradiance / pi.   Repeat  a pure function of its arguments
 
 #include <cstdint>
