@@ -28,21 +28,19 @@ LocalFrame turned(const DirectionSets& sets, std::uint64_t seed, std::uint64_t i
 
 SphereGather::SphereGather(const World& world, GridContent content, int rays, std::uint64_t seed)
     : seed_(mix64(seed ^ 0x67726964ULL)),
-      few_(0, std::min(rays, kFewRays), kSets, seed_, 0, Spread::sphere),
-      more_(0, std::max(0, rays - few_.samples()), kSets, mix64(seed_), 0, Spread::sphere),
-      light_(world,
-             {.count = few_.samples() + more_.samples(), .density = kUniform, .direct = content == GridContent::all},
-             seed_) {}
+      sets_(0, rays, kSets, seed_, std::max(0, (rays - 1) / kPacket * kPacket), Spread::sphere),
+      light_(world, {.count = sets_.samples(), .density = kUniform, .direct = content == GridContent::all}, seed_) {}
 
 GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint64_t& rays) const {
-  const LocalFrame frame = turned(few_, seed_, item);
+  const LocalFrame frame = turned(sets_, seed_, item);
   Work work{Random(seed_, item, 2), {}, rays};
-  Rays16 from;
-  from.ox.fill(place.x), from.oy.fill(place.y), from.oz.fill(place.z), from.far.fill(kFar);
-  trace_batch(few_, frame, 0, from, work);
-  // Rays lie along a curve, so that packets of the large set are narrow; where nothing is seen, inside solids, none go.
-  for (int first = 0; first < more_.samples() / kPacket && work.open > 0; first += kBatch)
-    trace_batch(more_, frame, first, from, work);
+  Batch from;
+  for (Rays16& packet : from)
+    packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z), packet.far.fill(kFar);
+  const int packets = sets_.samples() / kPacket;
+  trace_batch(frame, packets - 1, from, work);
+  for (int first = 0; first < packets - 1 && (first == 0 || work.open > 0); first += kBatch)
+    trace_batch(frame, first, from, work);
   GatheredLight out{work.sums.vectors(kSphere / static_cast<float>(work.sent)),
                     static_cast<float>(work.backs) / static_cast<float>(work.sent)};
   OctantSums lights;
@@ -51,17 +49,15 @@ GatheredLight SphereGather::at(const Vec3f& place, std::uint64_t item, std::uint
   return out;
 }
 
-/// kBatch packets from `first` on: all are traced before any hit is looked at, so that what the hits need is in the
-/// cache.
-void SphereGather::trace_batch(const DirectionSets& sets, const LocalFrame& frame, int first, Rays16& from,
-                               Work& work) const {
-  std::array<Rays16, kBatch> rays;
+/// Up to kBatch packets from `first` to the end of their round: all are traced before any hit is looked at, and all are
+/// looked at before any light is read, so that what the hits need is in the cache.
+void SphereGather::trace_batch(const LocalFrame& frame, int first, Batch& rays, Work& work) const {
   std::array<Hits16, kBatch> hits;
   const World& world = light_.world();
-  const auto count = static_cast<std::size_t>(std::min(kBatch, sets.samples() / kPacket - first));
+  const int last = sets_.samples() / kPacket - 1, end = first < last ? last : last + 1;
+  const auto count = static_cast<std::size_t>(std::min(kBatch, end - first));
   for (std::size_t k = 0; k < count; ++k) {
-    rays[k] = from;
-    sets.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
+    sets_.turn(frame.set, first + static_cast<int>(k), frame.basis, rays[k]);
     world.tracer.closest16(rays[k], hits[k]);
     for (std::size_t i = 0; i < kPacket; ++i) {
       const std::uint32_t triangle = hits[k].triangle[i];
@@ -71,15 +67,22 @@ void SphereGather::trace_batch(const DirectionSets& sets, const LocalFrame& fram
   const int sent = static_cast<int>(count) * kPacket;
   work.sent += sent;
   work.rays += static_cast<std::uint64_t>(sent);
-  for (std::size_t k = 0; k < count; ++k) {
-    for (std::size_t i = 0; i < kPacket; ++i) {
-      const Vec3f w{rays[k].dx[i], rays[k].dy[i], rays[k].dz[i]};
-      const Hit hit{hits[k].t[i], hits[k].u[i], hits[k].v[i], hits[k].triangle[i], false};
-      const IncidentLight::Seen seen = light_.along(w, hit, work.random, work.rays);
-      if (seen.met == IncidentLight::Met::back) ++work.backs;
-      if (seen.met == IncidentLight::Met::sky || seen.met == IncidentLight::Met::lit) ++work.open;
-      work.sums.add(w, seen.light);
-    }
+  const auto ray = [&](std::size_t at) {
+    const std::size_t k = at / kPacket, i = at % kPacket;
+    return std::pair<Vec3f, Hit>{{rays[k].dx[i], rays[k].dy[i], rays[k].dz[i]},
+                                 {hits[k].t[i], hits[k].u[i], hits[k].v[i], hits[k].triangle[i], false}};
+  };
+  std::array<IncidentLight::Landing, std::size_t{kBatch} * kPacket> landings;
+  for (std::size_t at = 0; at < count * kPacket; ++at) {
+    const auto [w, hit] = ray(at);
+    landings[at] = light_.look(w, hit);
+  }
+  for (std::size_t at = 0; at < count * kPacket; ++at) {
+    const auto [w, hit] = ray(at);
+    const IncidentLight::Seen seen = light_.along(w, hit, landings[at], work.random, work.rays);
+    if (seen.met == IncidentLight::Met::back) ++work.backs;
+    if (seen.met == IncidentLight::Met::sky || seen.met == IncidentLight::Met::lit) ++work.open;
+    if (seen.light != Vec3f{}) work.sums.add(w, seen.light);
   }
 }
 

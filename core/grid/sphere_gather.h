@@ -3,11 +3,12 @@
 //   I_d = sum over rays w_k of d's hemisphere of L(w_k) 4 pi / N w_k                                               (1)
 // Indirect L is what surfaces reflect (core/meshless/lit_surface.h): a ray costs its hit and one read of a table.
 // All      adds the light of lamps and sky as well (core/meshless/incident_light.h).
-// Rays     a small and a large stratified set on the sphere, each place by a turn of its own. A place of which the
-// small
-//          one meets neither sky nor a surface that light is known of is inside a solid and takes no more.
+// Rays     a stratified set on the sphere, each place by a turn of its own, along a curve so that packets are narrow;
+//          the last packet goes first and looks everywhere. A place of which it and a batch more meet neither sky nor a
+//          surface that light is known of is inside a solid and takes no more.
 // Error    that of N stratified rays and of the lit surface.   Repeat  a pure function of its arguments
 
+#include <array>
 #include <cstdint>
 
 #include "core/base/random.h"
@@ -33,7 +34,6 @@ class SphereGather {
 
  private:
   static constexpr int kBatch = 4;  // packets that are traced together
-  static constexpr int kFewRays = kBatch * kPacket;
   /// A place in the making.
   struct Work {
     Random random;
@@ -42,10 +42,11 @@ class SphereGather {
     int sent = 0, backs = 0;  // rays of the sphere
     int open = 0;             // of them: met the sky, or a surface that light is known of
   };
-  void trace_batch(const DirectionSets&, const LocalFrame&, int first, Rays16& from, Work&) const;
+  using Batch = std::array<Rays16, kBatch>;
+  void trace_batch(const LocalFrame&, int first, Batch&, Work&) const;
 
   std::uint64_t seed_;
-  DirectionSets few_, more_;
+  DirectionSets sets_;
   IncidentLight light_;
 };
 

@@ -51,14 +51,6 @@ Environment IncidentLight::blurred_sky() const {
   return averaged_sky(height, std::max(2, kFinest / height), [this](const Vec3f& w) { return balanced_sky(w); });
 }
 
-IncidentLight::Seen IncidentLight::along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
-  if (!hit) return {sky_along(w), Met::sky};
-  if (world_.faces.side(hit.triangle, w) == HitSide::dark) return {{}, Met::back};
-  LitSurface::Reflected from{.light = {}, .known = true};
-  if (world_.surface != nullptr) from = world_.surface->reflected(hit, w, random, rays);
-  return {own_.direct ? from.light + seen_emitter(hit, w) : from.light, from.known ? Met::lit : Met::unknown};
-}
-
 void IncidentLight::visit_lights(const Vec3f& place, std::uint64_t item, std::uint64_t& rays,
                                  const Visit& visit) const {
   visit_punctual(place, rays, [&](std::size_t, const Vec3f& w, const Vec3f& light) { visit(w, light, -1); });

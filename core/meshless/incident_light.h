@@ -47,8 +47,29 @@ class IncidentLight {
     Vec3f light;
     Met met = Met::sky;
   };
+  /// Looks where a ray landed, and asks for what along() will read there: best for many rays before it.
+  struct Landing {
+    HitSide side = HitSide::dark;  // of a hit
+    Senders::Slot slot;
+  };
+  Landing look(const Vec3f& w, const Hit& hit) const {
+    if (!hit) return {};
+    Landing at{.side = world_.faces.side(hit.triangle, w), .slot = {}};
+    if (at.side != HitSide::dark && world_.surface != nullptr)
+      at.slot = world_.surface->look(hit, at.side == HitSide::flipped);
+    return at;
+  }
   /// What one of the caller's rays brings. Adds the rays of paths to `rays`.
-  Seen along(const Vec3f& w, const Hit&, Random&, std::uint64_t& rays) const;
+  Seen along(const Vec3f& w, const Hit& hit, const Landing& at, Random& random, std::uint64_t& rays) const {
+    if (!hit) return {own_.direct ? sky_along(w) : Vec3f{}, Met::sky};
+    if (at.side == HitSide::dark) return {{}, Met::back};
+    LitSurface::Reflected from{.light = {}, .known = true};
+    if (world_.surface != nullptr) from = world_.surface->reflected(at.slot, hit, w, random, rays);
+    return {own_.direct ? from.light + seen_emitter(hit, w) : from.light, from.known ? Met::lit : Met::unknown};
+  }
+  Seen along(const Vec3f& w, const Hit& hit, Random& random, std::uint64_t& rays) const {
+    return along(w, hit, look(w, hit), random, rays);
+  }
 
   /// The sky as rays see it where nothing is in their way.
   Vec3f sky_along(const Vec3f& w) const;

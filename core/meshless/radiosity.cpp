@@ -175,7 +175,7 @@ class Solver {
              [&](std::size_t p) { out_.point_light[p] += sum_of(reading_->of_point(p), gathered); });
     read_vertices(gathered, total);
     probe(total, [this](std::uint32_t v) { return spread_of(v); });
-    out_.surface->set_light(std::move(total));
+    out_.surface->set_light(std::move(total), threads_);
   }
 
   /// The paper's scheme, on all points but those that were asked for.
@@ -213,7 +213,7 @@ class Solver {
     for_each(total.size(), [&](std::size_t p) { total[p] += reflected(at_[p]); });
     for_each(out_.point_light.size(), [&](std::size_t p) { out_.point_light[p] += total[p] - direct_[p]; });
     probe(total, [&](std::uint32_t v) { return spread_of(basis, light.gathered, site_of(vertices_[v])); });
-    out_.surface->set_light(std::move(total));
+    out_.surface->set_light(std::move(total), threads_);
   }
 
   /// Of a value of the finest level that was gathered everywhere around: what coarser ones add cancels.

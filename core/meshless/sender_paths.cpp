@@ -7,7 +7,7 @@
 #include "core/sphere/sampling.h"
 
 namespace kiln {
-SenderPaths::End SenderPaths::follow(Hit hit, Vec3f direction, Random& random, std::uint64_t& rays) const {
+SenderPaths::End SenderPaths::follow(Hit hit, Vec3f direction, Random& random, std::uint64_t& rays, bool alone) const {
   const Mesh& mesh = world_.tracer.scene().mesh;
   End end;
   for (int step = 0; step < kMostSteps; ++step) {
@@ -21,8 +21,9 @@ SenderPaths::End SenderPaths::follow(Hit hit, Vec3f direction, Random& random, s
     }
     const float most = std::max({end.throughput.x, end.throughput.y, end.throughput.z});
     if (!(most > 0)) return end;
-    end.sender = side == HitSide::front ? world_.senders.at(hit.triangle, hit.u, hit.v)
-                                        : world_.senders.behind(hit.triangle, hit.u, hit.v);
+    if (step > 0 || !alone)
+      end.sender = side == HitSide::front ? world_.senders.at(hit.triangle, hit.u, hit.v)
+                                          : world_.senders.behind(hit.triangle, hit.u, hit.v);
     if (end.sender != Senders::kNone) return end;
 
     const Triangle& t = mesh.triangles[hit.triangle];

@@ -38,8 +38,8 @@ class SenderPaths {
 
   static constexpr int kMostSteps = 4;
 
-  /// `hit` of a ray along `direction`. Adds the rays sent to `rays`.
-  End follow(Hit hit, Vec3f direction, Random&, std::uint64_t& rays) const;
+  /// `hit` of a ray along `direction`. Adds the rays sent to `rays`. `alone`: it is known that none stands for the hit.
+  End follow(Hit hit, Vec3f direction, Random&, std::uint64_t& rays, bool alone = false) const;
 
  private:
   World world_;

@@ -62,6 +62,36 @@ void Senders::add_new(Threads& threads) {
   threads.for_blocks(faces_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) fill(t, fresh);
   });
+  cut_open_cells(cells_);
+  cut_open_cells(back_cells_);
+  threads.for_blocks(faces_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
+      fill_parts(t, fresh, false);
+      if (backs_ && is_double_sided(scene_, t)) fill_parts(t, fresh, true);
+    }
+  });
+}
+
+void Senders::cut_open_cells(Answers& cells) {
+  for (std::uint32_t& answer : cells) {
+    if (answer != kToCut) continue;
+    answer = kCut | static_cast<std::uint32_t>(parts_.size());
+    parts_.emplace_back().fill(kNone);
+  }
+}
+
+void Senders::fill_parts(std::uint32_t triangle, const PointGrid& fresh, bool back) {
+  const Face& f = faces_[triangle];
+  for (std::uint32_t cell = 0; cell < std::uint32_t{f.columns} * f.rows; ++cell) {
+    const std::uint32_t answer = (back ? back_cells_ : cells_)[f.begin + cell];
+    if (!is_cut(answer)) continue;
+    auto& parts = parts_[answer & ~kCut];
+    for (std::uint32_t part = 0; part < kPartsOfCell; ++part) {
+      const Area area = area_of(triangle, cell, part);
+      if (is_open(parts[part]) && any_near(fresh, site_in(area, {0.5F, 0.5F}).position))
+        parts[part] = answer_of(area, back);
+    }
+  }
 }
 
 /// The corner whose edges take the fewest cells.
@@ -89,11 +119,12 @@ void Senders::fill(std::uint32_t triangle, const PointGrid& fresh) {
   for (std::uint32_t j = 0; j < f.rows; ++j) {
     for (std::uint32_t i = 0; i < f.columns; ++i) {
       if (i * f.rows + j * f.columns >= std::uint32_t{f.columns} * f.rows) break;  // outside, as all to come
-      const std::uint32_t cell = f.begin + j * f.columns + i;
-      const bool open = cells_[cell] >= kLook || (back && back_cells_[cell] >= kLook);
-      if (!open || !any_near(fresh, site_in_cell(triangle, i, j, {0.5F, 0.5F}).position)) continue;
-      if (cells_[cell] >= kLook) cells_[cell] = answer_of_cell(triangle, i, j, false);
-      if (back && back_cells_[cell] >= kLook) back_cells_[cell] = answer_of_cell(triangle, i, j, true);
+      const Area area{triangle, j * f.columns + i};
+      const std::uint32_t cell = f.begin + area.cell;
+      if (!is_open(cells_[cell]) && !(back && is_open(back_cells_[cell]))) continue;
+      if (!any_near(fresh, site_in(area, {0.5F, 0.5F}).position)) continue;
+      if (is_open(cells_[cell])) cells_[cell] = answer_of(area, false);
+      if (back && is_open(back_cells_[cell])) back_cells_[cell] = answer_of(area, true);
     }
   }
 }
@@ -104,20 +135,26 @@ bool Senders::any_near(const PointGrid& grid, const Vec3f& place) const {
   return any;
 }
 
-/// The place at (x, y) of a cell, each from 0 to 1.
-SurfaceSite Senders::site_in_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, const Vec2f& at) const {
-  const Face& f = faces_[triangle];
-  float a = (static_cast<float>(i) + at.x) / f.columns, b = (static_cast<float>(j) + at.y) / f.rows;
-  if (const float sum = a + b; sum > 1) a /= sum, b /= sum;
-  const Vec2f uv = to_uv(f.corner, a, b);
-  return site_on(triangle, uv.x, uv.y, false);
+/// The place at (x, y) of an area, each from 0 to 1, on the lit side.
+SurfaceSite Senders::site_in(const Area& area, const Vec2f& at) const {
+  const Vec2f uv = uv_in(area, at.x, at.y);
+  return site_on(area.triangle, uv.x, uv.y, false);
 }
 
-std::uint32_t Senders::answer_of_cell(std::uint32_t triangle, std::uint32_t i, std::uint32_t j, bool back) const {
+Vec2f Senders::uv_in(const Area& area, float x, float y) const {
+  const Face& f = faces_[area.triangle];
+  const std::uint32_t i = area.cell % f.columns, j = area.cell / f.columns;
+  float a = (static_cast<float>(i) + area.low.x + area.size * x) / f.columns;
+  float b = (static_cast<float>(j) + area.low.y + area.size * y) / f.rows;
+  if (const float sum = a + b; sum > 1) a /= sum, b /= sum;
+  return to_uv(f.corner, a, b);
+}
+
+std::uint32_t Senders::answer_of(const Area& area, bool back) const {
   constexpr std::array<Vec2f, 4> kCorners = {{{0.1F, 0.1F}, {0.9F, 0.1F}, {0.1F, 0.9F}, {0.9F, 0.9F}}};
   constexpr float kSmall = 0.5F;  // of R: cells no longer are not looked at more closely
   const auto site = [&](const Vec2f& at) {
-    SurfaceSite s = site_in_cell(triangle, i, j, at);
+    SurfaceSite s = site_in(area, at);
     if (back) s.normal = -s.normal;
     return s;
   };
@@ -129,12 +166,13 @@ std::uint32_t Senders::answer_of_cell(std::uint32_t triangle, std::uint32_t i, s
     corners[k] = site(kCorners[k]);
     longest = std::max(longest, length(corners[k].position - corners[0].position));
   }
-  const bool small = longest <= kSmall * finest_;
-  if (!small && std::ranges::any_of(corners, [&](const SurfaceSite& s) { return grouped(s).group != centre.group; }))
-    return kLook;
-  if (found.sender == kNone) return found.any ? kLook : kNone;
-  if (small) return found.sender;
-  return in_sight(tracer_, this->site(found.sender), corners) == (1U << corners.size()) - 1 ? found.sender : kLook;
+  const bool is_cell = area.size == 1;
+  if (is_cell && longest <= kSmall * finest_) return found.sender == kNone && found.any ? kLook : found.sender;
+  const std::uint32_t differs = is_cell ? kToCut : kLook;
+  if (std::ranges::any_of(corners, [&](const SurfaceSite& s) { return grouped(s).group != centre.group; }))
+    return differs;
+  if (found.sender == kNone) return found.any ? differs : kNone;
+  return in_sight(tracer_, this->site(found.sender), corners) == (1U << corners.size()) - 1 ? found.sender : differs;
 }
 
 SurfaceSite Senders::site_on(std::uint32_t triangle, float u, float v, bool back) const {
@@ -189,28 +227,45 @@ Senders::Search Senders::search(const SurfaceSite& at) const {
 }
 
 std::uint32_t Senders::at(std::uint32_t triangle, float u, float v) const {
-  const Face& f = faces_[triangle];
-  const std::uint32_t known = f.columns == 0 ? kLook : cells_[cell_at(f, u, v)];
+  const std::uint32_t known = answer_at(cells_, triangle, u, v);
   return known == kLook ? nearest(grouped(site_on(triangle, u, v, false))) : known;
 }
 
 std::uint32_t Senders::behind(std::uint32_t triangle, float u, float v) const {
   if (!backs_) return kNone;
-  const Face& f = faces_[triangle];
-  const std::uint32_t known = f.columns == 0 ? kLook : back_cells_[cell_at(f, u, v)];
+  const std::uint32_t known = answer_at(back_cells_, triangle, u, v);
   return known == kLook ? nearest(grouped(site_on(triangle, u, v, true))) : known;
 }
 
-std::uint32_t Senders::cell_at(const Face& f, float u, float v) const {
+std::uint32_t Senders::answer_at(const Answers& cells, std::uint32_t triangle, float u, float v) const {
+  const Face& f = faces_[triangle];
+  if (f.columns == 0) return kLook;
+  const Slot read = cell_at(f, u, v);
+  const std::uint32_t answer = cells[read.cell];
+  return is_cut(answer) ? parts_[answer & ~kCut][read.part] : answer;
+}
+
+Senders::Slot Senders::slot(std::uint32_t triangle, float u, float v, bool back) const {
+  const Face& f = faces_[triangle];
+  if (f.columns == 0 || (back && !backs_)) return {};
+  Slot at = cell_at(f, u, v);
+  if (back) at.cell += static_cast<std::uint32_t>(cells_.size());
+  return at;
+}
+
+Senders::Slot Senders::cell_at(const Face& f, float u, float v) const {
   const Vec2f at = from_uv(f.corner, u, v);
-  const auto cell = [](float x, std::uint16_t cells) {
-    return static_cast<std::uint32_t>(std::clamp(static_cast<int>(x * cells), 0, cells - 1));
+  // A part's number along an edge: those of the first cell, then of the second, and so on.
+  const auto part_along = [](float x, std::uint16_t cells) {
+    const int parts = static_cast<int>(kParts) * cells;
+    return static_cast<std::uint32_t>(std::clamp(static_cast<int>(x * static_cast<float>(parts)), 0, parts - 1));
   };
-  std::uint32_t i = cell(at.x, f.columns);
-  const std::uint32_t j = cell(at.y, f.rows);
+  const std::uint32_t x = part_along(at.x, f.columns), y = part_along(at.y, f.rows);
+  std::uint32_t i = x / kParts;
+  const std::uint32_t j = y / kParts;
   // A hit on the far edge may round into a cell that is outside.
   while (i > 0 && i * f.rows + j * f.columns >= std::uint32_t{f.columns} * f.rows) --i;
-  return f.begin + j * f.columns + i;
+  return {f.begin + j * f.columns + i, y % kParts * kParts + x % kParts};
 }
 
 }  // namespace kiln

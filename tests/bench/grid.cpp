@@ -1,7 +1,7 @@
 // Irradiance vector grids of the reference scene against its indirect light (comb - dir), and the rate of gathering.
 //   kiln_grid_bench [longest side] [rays]      default: 8, 16, 32, 64 with 512 rays
-//   kiln_grid_bench rate                       gathering at 64 along the longest side against Embree alone, in
-//                                              processor seconds: Cornell and the dungeon
+//   kiln_grid_bench rate [rays]                gathering at 64 along the longest side against the same rays in Embree
+//                                              alone, in processor seconds, medians of five: Cornell and the dungeon
 // One JSON line a case: relRMSE at the vertices by blend, corners and filter; seconds; rays; bytes.
 
 #include <chrono>
@@ -14,6 +14,7 @@
 #include "core/grid/cell_corners.h"
 #include "core/grid/surface_gather.h"
 #include "core/meshless/radiosity.h"
+#include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
 #include "tests/bench/bench.h"
 #include "tests/core/prt/reference_set.h"
@@ -130,47 +131,89 @@ void run_floor(const Case& c, const LitSurface& surface, int rays) {
   }
 }
 
-/// Rays of a vertex alone, without looking at what they hit: what Embree could do at most.
-void run_rate(const char* name, const Tracer& tracer, const LitSurface& surface, int longest, int rays,
-              Threads& threads) {
-  const Box box = box_of(tracer.scene().mesh);
-  const Lattice lattice = lattice_over(box.low, box.high, even_size(box.low, box.high, longest));
-  const std::vector<Vec3f> places = gather_places(lattice, tracer.scene(), threads);
-  const DirectionSets sets(0, rays, 8, 1, 0, Spread::sphere);
-  const double start = process_seconds();
-  std::atomic<std::uint64_t> hits_found = 0;
-  threads.for_blocks(places.size(), 32, [&](std::size_t begin, std::size_t end) {
+/// The rays of some vertices alone, without looking at what they hit: what Embree could do at most. As many of each
+/// vertex as `sent` says.
+struct BareRays {
+  const Tracer& tracer;
+  const DirectionSets& sets;
+
+  /// Returns how many were sent, and adds those that hit.
+  std::uint64_t trace(const Vec3f& place, std::size_t vertex, std::uint64_t sent, float& found) const {
     Rays16 packet;
     Hits16 hits;
-    std::uint64_t found = 0;
-    packet.far.fill(4);
-    for (std::size_t v = begin; v < end; ++v) {
-      packet.ox.fill(places[v].x), packet.oy.fill(places[v].y), packet.oz.fill(places[v].z);
-      const LocalFrame frame = local_frame(sets, {0, 1, 0}, 1, v);
-      for (int k = 0; k < sets.samples() / kPacket; ++k) {
-        sets.turn(frame.set, k, frame.basis, packet);
-        tracer.closest16(packet, hits);
-        for (const std::uint32_t t : hits.triangle) found += t != kNoHit ? 1 : 0;
+    packet.far.fill(kFar), packet.ox.fill(place.x), packet.oy.fill(place.y), packet.oz.fill(place.z);
+    const LocalFrame frame = local_frame(sets, {0, 1, 0}, 1, vertex);
+    const auto packets = std::min<std::uint64_t>(sent, static_cast<std::uint64_t>(sets.samples())) / kPacket;
+    for (std::uint64_t k = 0; k < packets; ++k) {
+      sets.turn(frame.set, static_cast<int>(k), frame.basis, packet);
+      tracer.closest16(packet, hits);
+      for (const std::uint32_t t : hits.triangle) found += t != kNoHit ? 1.0F : 0.0F;
+    }
+    return packets * kPacket;
+  }
+};
+
+/// Rays and the processor seconds they took.
+struct Spent {
+  double rays = 0, seconds = 0;
+  double rate() const { return 1e-6 * rays / seconds; }
+};
+
+/// Gathers every vertex and sends the same rays bare, in turns of a slab of vertices each, so that both meet the same
+/// machine.
+void run_rate(const char* name, const Tracer& tracer, const LitSurface& surface, const GridBake& params,
+              Threads& threads) {
+  constexpr std::size_t kSlab = 8192, kRounds = 5;
+  const Box box = box_of(tracer.scene().mesh);
+  const Lattice lattice = lattice_over(box.low, box.high, params.size);
+  const std::vector<Vec3f> places = gather_places(lattice, tracer.scene(), threads);
+  const SphereGather gather({tracer, surface.faces(), &surface, nullptr}, params.content, params.rays, params.seed);
+  const DirectionSets sets(0, params.rays, 8, 1, 0, Spread::sphere);
+  const BareRays bare{tracer, sets};
+  std::vector<std::uint64_t> sent(places.size());
+  std::vector<float> sums(places.size());  // so that nothing is left out as unused
+  std::vector<double> ratios, ours, embree;
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    std::array<Spent, 2> spent;
+    for (std::size_t slab = 0; slab < places.size(); slab += kSlab) {
+      const std::size_t count = std::min(kSlab, places.size() - slab);
+      for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
+        std::atomic<std::uint64_t> rays = 0;
+        const double start = process_seconds();
+        threads.for_blocks(count, 32, [&](std::size_t begin, std::size_t end) {
+          std::uint64_t own = 0;
+          for (std::size_t v = slab + begin; v < slab + end; ++v) {
+            if (which == 1) {
+              own += bare.trace(places[v], v, sent[v], sums[v]);
+              continue;
+            }
+            sent[v] = 0;
+            sums[v] = gather.at(places[v], v, sent[v]).light.vector[0][0].x;
+            own += sent[v];
+          }
+          rays += own;
+        });
+        spent[which].seconds += process_seconds() - start;
+        spent[which].rays += static_cast<double>(rays);
       }
     }
-    hits_found += found;
-  });
-  const double bare = 1e-6 * static_cast<double>(places.size()) * sets.samples() / (process_seconds() - start);
-  const double again = process_seconds();
-  const BakedGrid baked = bake_grid({tracer, surface.faces(), &surface, nullptr},
-                                    {.size = lattice.size, .rays = rays, .corners = false}, threads);
-  const double ours = 1e-6 * static_cast<double>(baked.stats.rays) / (process_seconds() - again);
+    ours.push_back(spent[0].rate()), embree.push_back(spent[1].rate());
+    ratios.push_back(spent[0].rate() / spent[1].rate());
+  }
   std::printf(
-      "{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"longest\":%d,\"rays\":%d,\"embree_mrays_s\":%.2f,"
-      "\"bake_mrays_s\":%.2f,\"ratio\":%.3f}\n",
-      name, longest, rays, bare, ours, ours / bare);
+      "{\"bench\":\"grid\",\"scene\":\"%s\",\"case\":\"rate\",\"vertices\":%zu,\"rays\":%d,\"embree_mrays_s\":%.2f,"
+      "\"gather_mrays_s\":%.2f,\"ratio\":%.3f,\"lowest\":%.3f,\"highest\":%.3f}\n",
+      name, places.size(), params.rays, median(embree), median(ours), median(ratios),
+      *std::min_element(ratios.begin(), ratios.end()), *std::max_element(ratios.begin(), ratios.end()));
+  std::fflush(stdout);
 }
 
-void run_rates(const testing::ReferenceSet& set, Threads& threads) {
+void run_rates(const testing::ReferenceSet& set, int rays, Threads& threads) {
   const auto rate = [&](const char* name, const Scene& scene) {
     const Tracer tracer(scene, threads);
     const RadiosityResult light = solve_radiosity(tracer, nullptr, {}, threads);
-    run_rate(name, tracer, *light.surface, 64, 256, threads);
+    const Box box = box_of(scene.mesh);
+    run_rate(name, tracer, *light.surface, {.size = even_size(box.low, box.high, 64), .rays = rays}, threads);
   };
   rate("cornell", set.scene);
   if (const auto dungeon = testing::load_scene(KILN_SHARED, "scenes/dungeon-interior/level-dungeon.gltf"))
@@ -189,7 +232,8 @@ int main(int argc, char** argv) {
   std::vector<Vec3f> truth = set->values("cornell.comb");
   const std::vector<Vec3f> direct = set->values("cornell.dir");
   for (std::size_t i = 0; i < truth.size(); ++i) truth[i] -= direct[i];
-  if (argc > 1 && std::string(argv[1]) == "rate") return run_rates(*set, threads), 0;
+  if (argc > 1 && std::string(argv[1]) == "rate")
+    return run_rates(*set, argc > 2 ? std::atoi(argv[2]) : 256, threads), 0;
   std::vector<int> sides{8, 16, 32, 64};
   if (argc > 1) sides = {std::atoi(argv[1])};
   const int rays = argc > 2 ? std::atoi(argv[2]) : 512;
