@@ -61,17 +61,24 @@ TEST(RadiosityPromise, ReflectionsThatTheRecipeLeavesOutAreToldWithTheirKnob) {
   EXPECT_NE(promise["reason"].get<std::string>().find("/steps/0/bounces"), std::string::npos) << promise["reason"];
 }
 
-/// The noise of gathers is seen where nothing else differs: the same points and vertices with many more rays.
+/// The noise of gathers is seen where nothing else differs: the same points and vertices with many more rays. One pair
+/// of bakes tells it to a third only, since both judge the same interpolation (.021 to .045 of seeds 1 to 8, whose mean
+/// is .034); eight tell it to a tenth. What the report says, .023, has the last reflection alone.
 TEST(RadiosityPromise, NoiseOfReflectionsIsWhatMoreRaysTakeAway) {
-  const auto run = [](int rays) {
+  const auto run = [](int seed, int rays) {
     const std::string step = R"({"quality":"draft","steps":[{"do":"radiosity","subdivide":"off","eps_irradiance":0,)"
                              R"("points":{"radius":0.5,"levels":3},"rays":)" +
-                             std::to_string(rays) + "}]}";
+                             std::to_string(rays) + R"(}],"seed":)" + std::to_string(seed) + "}";
     return report_of(baked(input_of("room", step)));
   };
-  const json few = run(16), many = run(1024);
-  const double taken = square(few["certificate"]["relrmse"]) - square(many["certificate"]["relrmse"]);
-  EXPECT_NEAR(few["error_sources"]["noise_of_reflections"].get<double>(), std::sqrt(taken), std::sqrt(taken) / 3);
+  double taken = 0, told = 0;
+  for (int seed = 1; seed <= 8; ++seed) {
+    const json few = run(seed, 16), many = run(seed, 256);
+    taken += (square(few["certificate"]["relrmse"]) - square(many["certificate"]["relrmse"])) / 8;
+    told += square(few["error_sources"]["noise_of_reflections"]) / 8;
+  }
+  EXPECT_LT(told, 1.1 * 1.1 * taken);
+  EXPECT_GT(told, 0.55 * 0.55 * taken);
 }
 
 /// A pass of 256 sky rays, gathers of 128 rays and 4000 points, as the loop sees it.
