@@ -8,5 +8,5 @@ kiln_library(kiln_baked_scene
   SOURCES baked_geometry.cpp evaluate.cpp eye.cpp grid_exr.cpp look.cpp look_json.cpp png.cpp reduced_glb.cpp
           streams.cpp write_baked_glb.cpp write_lightmap.cpp
   LINKS kiln_baked_reader kiln_import kiln_grid_data kiln_lightfield kiln_meshless kiln_base kiln_mesh kiln_sphere
-  PRIVATE_LINKS draco::draco nlohmann_json::nlohmann_json)
+  PRIVATE_LINKS draco::draco nlohmann_json::nlohmann_json PNG::PNG)
 set_source_files_properties(png.cpp PROPERTIES INCLUDE_DIRECTORIES /usr/include/stb)

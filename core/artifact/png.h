@@ -1,5 +1,5 @@
 #pragma once
-// PNG files from 8-bit pixels.
+// PNG files from pixels.
 
 #include <cstdint>
 #include <span>
@@ -11,6 +11,7 @@ namespace kiln {
 struct PixelShape {
   int width = 0, height = 0;
   int channels = 3;  // 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA
+  int depth = 8;     // bits of a value; of 16 the higher byte comes first
 };
 
 /// The bytes of a PNG. `pixels` holds height * width * channels values, top row first, as displayed (sRGB).

@@ -90,8 +90,8 @@ class Writer {
     return {{"attributes", attributes}, {"indices", accessors_.size() - 1}, {"material", 0}, {"mode", 4}};
   }
 
-  json texture(const char* name, const std::vector<std::uint8_t>& pixels) {
-    const Bytes png = write_png({what_.maps.side, what_.maps.side, 3}, pixels);
+  json texture(const char* name, const std::vector<std::uint8_t>& pixels, int bits) {
+    const Bytes png = write_png({what_.maps.side, what_.maps.side, 3, bits}, pixels);
     images_.push_back({{"name", name}, {"mimeType", "image/png"}, {"bufferView", add_view(png, 0)}});
     textures_.push_back({{"sampler", 0}, {"source", images_.size() - 1}});
     return {{"index", textures_.size() - 1}};
@@ -100,8 +100,8 @@ class Writer {
   json material() {
     json out = {{"name", "reduced"}, {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}};
     if (!what_.maps.color.empty())
-      out["pbrMetallicRoughness"]["baseColorTexture"] = texture("base colour", what_.maps.color);
-    if (what_.maps.side > 0) out["normalTexture"] = texture("normals", what_.maps.normal);
+      out["pbrMetallicRoughness"]["baseColorTexture"] = texture("base colour", what_.maps.color, 8);
+    if (what_.maps.side > 0) out["normalTexture"] = texture("normals", what_.maps.normal, what_.maps.normal_bits);
     return out;
   }
 

@@ -297,6 +297,11 @@ ReduceStep read_reduce(JsonFields& fields) {
     if (good) step.normal_map = map->get<int>();
     if (!good) fields.error("normal_map", "must be auto, off or a whole number from 64 to 8192", "auto, off, texels");
   }
+  if (const json* bits = fields.find("normal_bits")) {
+    if (*bits == 8 || *bits == 16) step.normal_bits = bits->get<int>();
+    if (*bits != 8 && *bits != 16) fields.error("normal_bits", "must be 8 or 16", "8, 16");
+    if (*bits == 16 && step.normal_map == 0) fields.error("normal_bits", "means nothing without a normal map", "8");
+  }
   return step;
 }
 

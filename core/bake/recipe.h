@@ -130,6 +130,7 @@ struct ReduceStep {
   std::optional<double> ratio;             // of the model's triangles
   ReduceMethod method = ReduceMethod::adaptive;
   std::optional<int> normal_map;  // texels along a side; 0: none; auto when absent
+  int normal_bits = 8;            // of the map: 8 or 16
 };
 
 enum class Quality { draft, standard, finest };  // "draft", "standard", "final"

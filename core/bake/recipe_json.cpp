@@ -134,6 +134,7 @@ json step_json(const ReduceStep& step) {
               {"method", step.method == ReduceMethod::cluster ? "cluster" : "adaptive"},
               {"normal_map", or_auto(step.normal_map)}};
   if (step.normal_map && *step.normal_map == 0) out["normal_map"] = "off";
+  if (step.normal_bits != 8) out["normal_bits"] = step.normal_bits;
   if (step.ratio) out["ratio"] = *step.ratio;
   if (!step.ratio) out["triangles"] = or_auto(step.triangles);
   return out;

@@ -149,7 +149,8 @@ std::string recipe_schema() {
         "triangles": {"description": "of the result, at most; auto: a tenth of the model's, at most 200000", "anyOf": [{"type": "integer", "minimum": 4, "maximum": 50000000}, {"$ref": "#/definitions/auto"}], "default": "auto"},
         "ratio": {"description": "of the model's triangles, instead of triangles", "type": "number", "minimum": 1e-6, "maximum": 1},
         "method": {"description": "what a model larger than limits.memory_mb goes through first: cells of one size, or an octree that is fine where the model is curved", "enum": ["cluster", "adaptive"], "default": "adaptive"},
-        "normal_map": {"description": "texels along a side", "anyOf": [{"type": "integer", "minimum": 64, "maximum": 8192}, {"enum": ["auto", "off"]}], "default": "auto"}
+        "normal_map": {"description": "texels along a side", "anyOf": [{"type": "integer", "minimum": 64, "maximum": 8192}, {"enum": ["auto", "off"]}], "default": "auto"},
+        "normal_bits": {"description": "of a value of the normal map; viewers in browsers show eight of sixteen", "enum": [8, 16], "default": 8}
       }
     }
   },

@@ -111,6 +111,7 @@ Result<Prepared> prepare(const BakeInput& input) {
   p.params = {.triangles = target_of(step, p.source.triangles),
               .method = step.method,
               .map_side = step.normal_map.value_or(-1),
+              .normal_bits = step.normal_bits,
               .memory_bytes = memory,
               .seed = input.recipe.seed};
   KILN_TRY(plan, plan_reduction(p.source, p.params));
@@ -143,7 +144,7 @@ ordered_json prediction_object(const Prepared& p) {
           {"rays", 0},
           {"seconds", p.plan.seconds + (p.preview_bytes > 0 ? kPreviewSeconds : 0)},
           {"memory_bytes", std::max(p.plan.memory_bytes, p.preview_bytes)},
-          {"artifact_bytes", 60 * triangles + 2 * texels}};
+          {"artifact_bytes", 60 * triangles + (p.params.normal_bits == 16 ? 5 : 2) * texels}};
 }
 
 ordered_json parameters_object(const Prepared& p) {
@@ -152,7 +153,8 @@ ordered_json parameters_object(const Prepared& p) {
           {"in_core", p.plan.in_core},
           {"cells", p.plan.cells},
           {"clustered_vertices", p.plan.vertices},
-          {"normal_map", p.plan.map_side}};
+          {"normal_map", p.plan.map_side},
+          {"normal_bits", p.params.normal_bits}};
 }
 
 ordered_json error_object(const Reduced& r) {
@@ -217,8 +219,10 @@ void put_normal_map(Scene& scene, const SurfaceMaps& maps) {
   const int texture = scene.materials.front().normal_texture.texture;
   Image& image = scene.images[static_cast<std::size_t>(scene.textures[static_cast<std::size_t>(texture)].image)];
   image.width = image.height = maps.side;
-  image.rgba.assign(4 * (maps.normal.size() / 3), 255);
-  for (std::size_t i = 0; i < maps.normal.size(); ++i) image.rgba[i / 3 * 4 + i % 3] = maps.normal[i];
+  const auto bytes = static_cast<std::size_t>(maps.normal_bits / 8);
+  const std::size_t values = maps.normal.size() / bytes;
+  image.rgba.assign(4 * (values / 3), 255);
+  for (std::size_t i = 0; i < values; ++i) image.rgba[i / 3 * 4 + i % 3] = maps.normal[bytes * i];
 }
 
 /// preview.png of what is delivered. A picture that cannot be made costs the job nothing but a warning.

@@ -16,6 +16,7 @@ namespace {
 constexpr std::uint64_t kBaseBytes = 64ULL << 20;  // program, batches, stacks
 constexpr std::uint64_t kLeafBytes = 560;          // a clustered vertex and its two triangles, collapse() included
 constexpr std::uint64_t kTexelBytes = 44;          // sums, both textures, their files on the way out
+constexpr std::uint64_t kDeepTexelBytes = 50;      // with normals of 16 bits, and those in their file
 constexpr std::uint64_t kResultBytes = 400;        // a triangle of the result: mesh, charts, candidate lists
 constexpr double kMoreThanAsked = 4;               // vertices that the collapse gets, per vertex of the result
 constexpr double kTexelsATriangle = 8;             // of the model, where memory allows
@@ -59,9 +60,11 @@ int power_of_two(double side) {
 }
 
 /// Eight texels for a triangle of the model, or those of its texture. Measured: core/reduce/README.md.
+std::uint64_t texel_bytes(const Reduce& params) { return params.normal_bits == 16 ? kDeepTexelBytes : kTexelBytes; }
+
 int map_side(const TriangleSource& source, const Reduce& params, std::uint64_t usable) {
   if (params.map_side >= 0) return params.map_side;
-  const auto most = static_cast<double>(usable) / kTexelBytes;
+  const auto most = static_cast<double>(usable) / static_cast<double>(texel_bytes(params));
   const double wanted =
       std::max(kTexelsATriangle * static_cast<double>(source.triangles), static_cast<double>(source.texels));
   int side = power_of_two(std::sqrt(wanted));
@@ -111,7 +114,8 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
   }
   plan.map_side = map_side(source, params, usable > result ? usable - result : 0);
   plan.most_map_side = 8192;
-  while (std::uint64_t(plan.most_map_side) * std::uint64_t(plan.most_map_side) * kTexelBytes + result > usable &&
+  while (std::uint64_t(plan.most_map_side) * std::uint64_t(plan.most_map_side) * texel_bytes(params) + result >
+             usable &&
          plan.most_map_side > 64)
     plan.most_map_side /= 2;
   const std::uint64_t whole = source.triangles * kCollectedBytes;
@@ -127,7 +131,7 @@ Result<ReducePlan> plan_reduction(const TriangleSource& source, const Reduce& pa
     first = std::max(plan.cells * kCellBytes + surface, plan.vertices * kLeafBytes);
   }
   const auto texels = static_cast<std::uint64_t>(plan.map_side) * static_cast<std::uint64_t>(plan.map_side);
-  plan.memory_bytes = taken + std::max(first, result + texels * kTexelBytes);
+  plan.memory_bytes = taken + std::max(first, result + texels * texel_bytes(params));
   const auto in = static_cast<double>(source.triangles), out = static_cast<double>(params.triangles);
   const double collapsed = plan.in_core ? in - out : kMoreThanAsked * out;
   plan.seconds =
@@ -189,7 +193,7 @@ Result<Reduced> reduce(const TriangleSource& file, const ReducePlan& plan, const
   out.plain_normal_degrees = out.normal_degrees = normal_error(out.mesh, nullptr, projection.probes);
   watched.begin("maps", 0.95);
   if (!atlas) return out;
-  out.maps = make_maps(out.mesh, *atlas, projection.texels, source.colors, threads);
+  out.maps = make_maps(out.mesh, *atlas, projection.texels, source.colors, params.normal_bits, threads);
   watched.look();
   out.normal_degrees = normal_error(out.mesh, &out.maps, projection.probes);
   return out;

@@ -19,7 +19,8 @@ namespace kiln {
 struct Reduce {
   std::uint64_t triangles = 100'000;  // of the result, at most
   ReduceMethod method = ReduceMethod::adaptive;
-  int map_side = -1;  // texels along a side; 0: no map, -1: as the model and the memory ask
+  int map_side = -1;    // texels along a side; 0: no map, -1: as the model and the memory ask
+  int normal_bits = 8;  // of the map: 8 or 16
   std::uint64_t memory_bytes = 4096ULL << 20;
   std::uint64_t seed = 0;
   std::function<void(const std::string& stage, double fraction)> begin;  // a stage that ends at `fraction`

@@ -244,9 +244,19 @@ class MapMaker {
     const Vec3d n = normalized(to_double(cell.normal), Vec3d{0, 0, 1});
     const std::size_t at = 3 * index(x, y);
     for (std::size_t c = 0; c < 3; ++c) {
-      out_.normal[at + c] = byte_of(0.5 * n[c] + 0.5);
+      put_normal(at + c, 0.5 * n[c] + 0.5);
       if (!out_.color.empty()) out_.color[at + c] = byte_of(to_srgb(std::clamp(double{cell.color[c]}, 0.0, 1.0)));
     }
+  }
+
+  void put_normal(std::size_t at, double share) const {
+    if (out_.normal_bits == 8) {
+      out_.normal[at] = byte_of(share);
+      return;
+    }
+    const auto value = static_cast<unsigned>(std::lround(65535 * std::clamp(share, 0.0, 1.0)));
+    out_.normal[2 * at] = static_cast<std::uint8_t>(value >> 8);
+    out_.normal[2 * at + 1] = static_cast<std::uint8_t>(value & 255U);
   }
 
   const Mesh& mesh_;
@@ -255,14 +265,20 @@ class MapMaker {
   SurfaceMaps& out_;
 };
 
+/// A stored value, from -1 to 1.
+double normal_value(const SurfaceMaps& maps, std::size_t at) {
+  if (maps.normal_bits == 8) return maps.normal[at] / 127.5 - 1;
+  return (256 * maps.normal[2 * at] + maps.normal[2 * at + 1]) / 32767.5 - 1;
+}
+
 /// Bilinear, as a sampler without mip maps does it.
 Vec3d map_normal(const SurfaceMaps& maps, const Vec2<double>& uv) {
   const double x = uv.x * maps.side - 0.5, y = uv.y * maps.side - 0.5;
   const double x0 = std::floor(x), y0 = std::floor(y), fx = x - x0, fy = y - y0;
   const auto texel = [&](double i, double j) {
     const auto at = [&](double k) { return static_cast<std::size_t>(std::clamp(k, 0.0, maps.side - 1.0)); };
-    const std::uint8_t* p = &maps.normal[3 * (at(j) * static_cast<std::size_t>(maps.side) + at(i))];
-    return Vec3d{p[0] / 127.5 - 1, p[1] / 127.5 - 1, p[2] / 127.5 - 1};
+    const std::size_t p = 3 * (at(j) * static_cast<std::size_t>(maps.side) + at(i));
+    return Vec3d{normal_value(maps, p), normal_value(maps, p + 1), normal_value(maps, p + 2)};
   };
   return (texel(x0, y0) * (1 - fx) + texel(x0 + 1, y0) * fx) * (1 - fy) +
          (texel(x0, y0 + 1) * (1 - fx) + texel(x0 + 1, y0 + 1) * fx) * fy;
@@ -320,11 +336,14 @@ Mesh delivered_mesh(const Surface& s, const Atlas* atlas, bool colors) {
 }
 
 SurfaceMaps make_maps(const Mesh& mesh, const Atlas& atlas, const std::vector<Texel>& texels, bool colors,
-                      Threads& threads) {
-  SurfaceMaps out{.side = atlas.side};
+                      int normal_bits, Threads& threads) {
+  SurfaceMaps out{.side = atlas.side, .normal_bits = normal_bits};
   const std::size_t pixels = static_cast<std::size_t>(atlas.side) * static_cast<std::size_t>(atlas.side);
-  out.normal.resize(3 * pixels);
-  for (std::size_t i = 0; i < pixels; ++i) out.normal[3 * i] = out.normal[3 * i + 1] = 128, out.normal[3 * i + 2] = 255;
+  const auto bytes = static_cast<std::size_t>(normal_bits / 8);
+  out.normal.assign(3 * bytes * pixels, 255);
+  for (std::size_t i = 0; i < pixels; ++i) {  // straight up, as nearly as zero can be said
+    for (std::size_t k = 0; k < 2 * bytes; ++k) out.normal[3 * bytes * i + k] = k % bytes == 0 ? 128 : 0;
+  }
   if (colors) out.color.assign(3 * pixels, 128);
   std::vector<std::pair<std::size_t, std::size_t>> counts(atlas.charts.size());
   const MapMaker maker(mesh, atlas, texels, out);

@@ -6,8 +6,8 @@
 // weighted means), then smoothed by diffusion; the rim around a chart is filled the same way, so that nothing bleeds.
 //
 // Paper    [Pacanowski06] section 2, step 4; [Gortler96] pull-push
-// Units    8 bits: normal = 2 c / 255 - 1, colour sRGB; row 0 is the top
-// Error    .25 degrees of 8 bits
+// Units    normal = 2 c / 255 - 1 of 8 bits, 2 c / 65535 - 1 of 16; colour sRGB, 8 bits; row 0 is the top
+// Error    of normals .25 degrees with 8 bits, .002 with 16
 // Repeat   same bits for any thread count
 
 #include <cstdint>
@@ -27,10 +27,11 @@ Mesh delivered_mesh(const Surface&, const Atlas*, bool colors);
 
 struct SurfaceMaps {
   int side = 0;
-  std::vector<std::uint8_t> normal, color;  // side * side * 3; no colour where the model has none
+  int normal_bits = 8;                      // or 16: then each value is two bytes, the higher first
+  std::vector<std::uint8_t> normal, color;  // side * side * 3 values; no colour where the model has none
   double filled = 0;                        // share of the charts' texels that no point fell into
 };
-SurfaceMaps make_maps(const Mesh&, const Atlas&, const std::vector<Texel>&, bool colors, Threads&);
+SurfaceMaps make_maps(const Mesh&, const Atlas&, const std::vector<Texel>&, bool colors, int normal_bits, Threads&);
 
 /// RMS angle in degrees between the model's normals and what a viewer shows there: the interpolated vertex normal, bent
 /// by the map (bilinear) where there is one.

@@ -33,5 +33,21 @@ TEST(Png, DecodesToTheSamePixels) {
   }
 }
 
+TEST(Png, OfSixteenBitsDecodesToTheSameValues) {
+  for (const int channels : {1, 2, 3, 4}) {
+    Bytes pixels;
+    Random random(8, 0);
+    for (int i = 0; i < 2 * 31 * 17 * channels; ++i) pixels.push_back(static_cast<std::uint8_t>(random.next()));
+    const Bytes file = write_png({31, 17, channels, 16}, pixels);
+    int width = 0, height = 0, found = 0;
+    stbi_us* decoded = stbi_load_16_from_memory(file.data(), static_cast<int>(file.size()), &width, &height, &found, 0);
+    ASSERT_NE(decoded, nullptr);
+    EXPECT_TRUE(width == 31 && height == 17 && found == channels);
+    for (std::size_t i = 0; i < pixels.size() / 2; ++i)
+      ASSERT_EQ(decoded[i], 256 * pixels[2 * i] + pixels[2 * i + 1]) << i;
+    stbi_image_free(decoded);
+  }
+}
+
 }  // namespace
 }  // namespace kiln

@@ -76,6 +76,8 @@ INSTANTIATE_TEST_SUITE_P(
         std::pair{R"({"steps":[{"do":"reduce","ratio":0}]})", false},
         std::pair{R"({"steps":[{"do":"reduce","ratio":1.5}]})", false},
         std::pair{R"({"steps":[{"do":"reduce","method":"sloppy"}]})", false},
+        std::pair{R"({"steps":[{"do":"reduce","normal_bits":16}]})", true},
+        std::pair{R"({"steps":[{"do":"reduce","normal_bits":12}]})", false},
         std::pair{R"({"steps":[{"do":"reduce","normal_map":63}]})", false},
         std::pair{R"({"steps":[{"do":"reduce","normal_map":"on"}]})", false},
         std::pair{R"({"steps":[{"do":"reduce","normal_map":0}]})", false},

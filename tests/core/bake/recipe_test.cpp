@@ -167,9 +167,9 @@ TEST(Recipe, OfAGridHasItsOwnParametersAndSurvivesARoundTrip) {
 }
 
 TEST(Recipe, OfAReductionHasItsOwnParametersAndSurvivesARoundTrip) {
-  for (const char* text :
-       {R"({"steps":[{"do":"reduce","triangles":5000,"method":"cluster","normal_map":256}]})",
-        R"({"steps":[{"do":"reduce","ratio":0.25,"normal_map":"off"}]})", R"({"steps":[{"do":"reduce"}]})"}) {
+  for (const char* text : {R"({"steps":[{"do":"reduce","triangles":5000,"method":"cluster","normal_map":256}]})",
+                           R"({"steps":[{"do":"reduce","ratio":0.25,"normal_map":"off"}]})",
+                           R"({"steps":[{"do":"reduce"}]})", R"({"steps":[{"do":"reduce","normal_bits":16}]})"}) {
     const auto recipe = parse_recipe(text);
     ASSERT_TRUE(recipe);
     EXPECT_TRUE(recipe->steps.empty());
@@ -181,6 +181,7 @@ TEST(Recipe, OfAReductionHasItsOwnParametersAndSurvivesARoundTrip) {
     EXPECT_EQ(again->reduce->ratio, recipe->reduce->ratio);
     EXPECT_EQ(again->reduce->method, recipe->reduce->method);
     EXPECT_EQ(again->reduce->normal_map, recipe->reduce->normal_map);
+    EXPECT_EQ(again->reduce->normal_bits, recipe->reduce->normal_bits);
   }
   EXPECT_EQ(parse_recipe(R"({"steps":[{"do":"reduce","normal_map":"off"}]})")->reduce->normal_map, 0);
 }
@@ -204,6 +205,9 @@ TEST(Recipe, OfAReductionNamesWhatIsWrong) {
             (std::vector<std::string>{"/steps/0/ratio"}));
   EXPECT_EQ(pointers(R"({"steps":[{"do":"reduce","normal_map":"big"}]})"),
             (std::vector<std::string>{"/steps/0/normal_map"}));
+  for (const char* step : {R"({"do":"reduce","normal_bits":12})", R"({"do":"reduce","normal_bits":"16"})",
+                           R"({"do":"reduce","normal_map":"off","normal_bits":16})"})
+    EXPECT_EQ(pointers(std::string(R"({"steps":[)") + step + "]}"), (std::vector<std::string>{"/steps/0/normal_bits"}));
   EXPECT_EQ(pointers(R"({"quality":{"target_error":0.1},"steps":[{"do":"reduce"}]})"),
             (std::vector<std::string>{"/quality"}));
 }

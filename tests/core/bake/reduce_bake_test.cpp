@@ -82,6 +82,24 @@ std::array<int, 3> middle_of(const BakeOutput& output) {
   return {(*pixels)[at], (*pixels)[at + 1], (*pixels)[at + 2]};
 }
 
+TEST(ReduceStep, StoresNormalsInSixteenBitsWhereItIsAsked) {
+  constexpr const char* kRecipe = R"({"steps":[{"do":"reduce","triangles":2000,"normal_map":256,"normal_bits":)";
+  const auto normals = [](const BakeOutput& output) {
+    return import_scene({.name = "scene.glb", .main = file(output, "scene.glb"), .resources = {}})->images.at(0);
+  };
+  const auto plain = bake_once(ball(std::string(kRecipe) + "8}]}")),
+             deep = bake_once(ball(std::string(kRecipe) + "16}]}"));
+  ASSERT_TRUE(plain && deep);
+  const Image eight = normals(*plain), sixteen = normals(*deep);
+  EXPECT_EQ(eight.encoded.at(24), 8);  // the depth in a PNG's header
+  EXPECT_EQ(sixteen.encoded.at(24), 16);
+  const auto few = decode_image(eight.encoded, *read_image_header(eight.encoded)),
+             many = decode_image(sixteen.encoded, *read_image_header(sixteen.encoded));
+  ASSERT_TRUE(few && many && few->size() == many->size());
+  for (std::size_t i = 0; i < few->size(); ++i) ASSERT_NEAR((*few)[i], (*many)[i], 1) << i;  // rounded once and twice
+  EXPECT_LT(report_of(*deep)["reduce"]["normal_degrees_rms"], report_of(*plain)["reduce"]["normal_degrees_rms"]);
+}
+
 TEST(ReduceStep, ShowsAConvexModelUnderAnEvenSkyEvenly) {
   BakeInput input;
   input.scene = {.name = "ball.ply", .main = testing::binary_ply(testing::sphere(40)), .resources = {}};

@@ -67,12 +67,17 @@ TEST(Maps, ShowTheNormalsThatFellIntoThem) {
   const Mesh mesh = delivered_mesh(s, &atlas, true);
   const Vec3f tilted = normalized(Vec3f{0.3F, -0.2F, 1});
   Threads threads(2);
-  const SurfaceMaps maps = make_maps(mesh, atlas, even_texels(atlas, tilted, {0.5F, 0.25F, 1}), true, threads);
+  const SurfaceMaps maps = make_maps(mesh, atlas, even_texels(atlas, tilted, {0.5F, 0.25F, 1}), true, 8, threads);
   EXPECT_EQ(maps.filled, 0);
   std::vector<NormalProbe> probes;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) probes.push_back({t, 0.3F, 0.3F, tilted, 1});
   EXPECT_LT(normal_error(mesh, &maps, probes), 0.4);  // 8 bits: half a step of 1/127.5 in each of three numbers
   EXPECT_GT(normal_error(mesh, nullptr, probes), 15);
+  const SurfaceMaps deep = make_maps(mesh, atlas, even_texels(atlas, tilted, {0.5F, 0.25F, 1}), true, 16, threads);
+  EXPECT_EQ(deep.normal.size(), 2 * maps.normal.size());
+  EXPECT_EQ(deep.color, maps.color);
+  // Half a step of 1/32767.5 is .002 degrees; the arc cosine of a float next to 1 is .02.
+  EXPECT_LT(normal_error(mesh, &deep, probes), 0.02);
   const Chart& chart = atlas.charts[0];
   const std::size_t middle = 3 * (static_cast<std::size_t>(chart.y + chart.height / 2) * 64 +
                                   static_cast<std::size_t>(chart.x + chart.width / 2));
@@ -97,7 +102,7 @@ TEST(Maps, FillHolesFromWhatIsAround) {
     }
   }
   Threads threads(1);
-  const SurfaceMaps maps = make_maps(mesh, atlas, texels, true, threads);
+  const SurfaceMaps maps = make_maps(mesh, atlas, texels, true, 8, threads);
   EXPECT_GT(maps.filled, 0.3);
   int before = -1;
   for (std::size_t x = static_cast<std::size_t>(chart.x + 4); x < 60; ++x) {
@@ -113,10 +118,15 @@ TEST(Maps, OfAChartThatNothingFellIntoAreFlat) {
   const Atlas atlas = placed(s.position, s.triangles, 64);
   const Mesh mesh = delivered_mesh(s, &atlas, true);
   Threads threads(1);
-  const SurfaceMaps maps = make_maps(mesh, atlas, std::vector<Texel>(64 * 64), true, threads);
+  const SurfaceMaps maps = make_maps(mesh, atlas, std::vector<Texel>(64 * 64), true, 8, threads);
   for (std::size_t i = 0; i < maps.normal.size(); i += 3) {
     EXPECT_EQ(maps.normal[i], 128);
     EXPECT_EQ(maps.normal[i + 2], 255);
+  }
+  const SurfaceMaps deep = make_maps(mesh, atlas, std::vector<Texel>(64 * 64), true, 16, threads);
+  for (std::size_t i = 0; i < deep.normal.size(); i += 6) {
+    EXPECT_EQ(256 * deep.normal[i] + deep.normal[i + 1], 32768);
+    EXPECT_EQ(256 * deep.normal[i + 4] + deep.normal[i + 5], 65535);
   }
 }
 
