@@ -16,6 +16,7 @@
 #include "core/base/base64.h"
 #include "core/base/sha256.h"
 #include "tests/faults/daemon.h"
+#include "tests/fixtures/send_all.h"
 
 namespace kiln::testing {
 namespace {
@@ -49,15 +50,6 @@ int connect_to(int port) {
   if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) return fd;
   ::close(fd);
   return -1;
-}
-
-bool send_all(int fd, std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    if (sent <= 0) return false;
-    bytes.remove_prefix(static_cast<std::size_t>(sent));
-  }
-  return true;
 }
 
 /// Passes connections on, and ends the first ones after so many bytes of their client.

@@ -7,8 +7,8 @@
 #include <set>
 #include <thread>
 
-#include "tests/fixtures/cutting_proxy.h"
 #include "tests/fixtures/postgres_server.h"
+#include "tests/fixtures/statement_cutter.h"
 #include "tests/server/jobs/store_conformance.h"
 
 namespace kiln::testing {
@@ -229,7 +229,7 @@ int work_patiently(JobStore& store, const std::string& id, TestClock& clock) {
 }
 
 TEST_F(PostgresStoreTest, ACutInEveryStatementOfAJobsLifeLosesAndDoublesNothing) {
-  CuttingProxy proxy(server().folder(), PostgresServer::kPort);
+  StatementCutter proxy(server().folder(), PostgresServer::kPort);
   TestClock clock;
   const auto cut =
       open_postgres_store({PostgresServer::address(proxy.folder()), [&clock] { return clock.now_ms; }}).value();
