@@ -211,11 +211,29 @@ void read_lamps(const json& root, const Fields& extension, BakedHeader& out, Fin
     findings.fail("not_a_baked_scene", "What is seen of lamps must be raw.", fields.pointer("form"));
 }
 
+/// What the r-RFs leave to diffuse light, if they do: the transfer vectors hold it.
+void read_diffuse(const json& root, const Fields& extension, BakedHeader& out, Findings& findings) {
+  if (!extension.has("diffuse")) return;
+  const Fields fields = extension.object("diffuse"), lobes = fields.object("lobes");
+  if (out.shape.order != 0 || out.shape.channels != 3)
+    return findings.fail("not_a_baked_scene", "Diffuse light is a transfer of order 0 with three channels.",
+                         extension.pointer("diffuse"));
+  if (lobes.count("rows", 0) != kLobeRows || lobes.count("views", 0) != kLobeViews)
+    return findings.fail("slot_count_mismatch", "The table of lobes must have 16 rows of 32 views.",
+                         lobes.pointer("rows"));
+  const std::string mean = fields.pointer("mean");
+  const auto c = numbers(at(root, mean), mean, 3, findings);
+  if (findings.failed()) return;
+  if (!std::ranges::all_of(c, [](double x) { return x >= 0; }))
+    return findings.fail("number_out_of_range", "A colour is not below zero.", mean);
+  out.diffuse_color = Vec3f{static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+}
+
 /// The r-RFs, if there are any.
 void read_field(const json& root, BakedHeader& out, Findings& findings) {
   if (!at(root, kFieldPlace).is_object()) return;
   const Fields extension(at(root, kFieldPlace), kFieldPlace, findings);
-  check_version(extension, 1, 3, findings);
+  check_version(extension, 1, 4, findings);
   check_basis(extension, findings);
   if (!extension.flag("reflected", false))
     findings.fail("not_a_baked_scene", "Radiance functions must be reflected.", extension.pointer("reflected"));
@@ -229,6 +247,7 @@ void read_field(const json& root, BakedHeader& out, Findings& findings) {
   read_sky(root, extension, out, findings);
   read_lamps(root, extension, out, findings);
   out.emission_apart = extension.flag("emissionApart", false);
+  read_diffuse(root, extension, out, findings);
 }
 
 /// The matrices, if there are any: their shape, with rows of zeros for the caller to fill.

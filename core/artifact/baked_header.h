@@ -35,10 +35,11 @@ struct BakedHeader {
     double slope = 0;
   };
   std::optional<Sky> sky;
-  std::vector<FieldLamp> lamps;  // that the field keeps apart
-  StoredForm lamp_form;          // of how much of them is seen
-  bool emission_apart = false;   // by the field
-  GlossyTransfer glossy;         // its shape; of rank 0 (and order 0) where there are no matrices
+  std::vector<FieldLamp> lamps;        // that the field keeps apart
+  StoredForm lamp_form;                // of how much of them is seen
+  bool emission_apart = false;         // by the field
+  std::optional<Vec3f> diffuse_color;  // where it keeps diffuse light apart: as LightField has it
+  GlossyTransfer glossy;               // its shape; of rank 0 (and order 0) where there are no matrices
   StoredForm glossy_form;
   int glossy_view = -1, lobes_view = -1;  // checked as components_view
   BakedLight light;

@@ -309,7 +309,10 @@ BakedScene read_scene(const BakedFile& file, Findings& findings) {
                .sky = {},
                .lamps = file.header.lamps,
                .lamp_visibility = std::move(field.lamps.coefficients),
-               .emission_apart = file.header.emission_apart};
+               .emission_apart = file.header.emission_apart,
+               .diffuse = {},
+               .diffuse_color = file.header.diffuse_color.value_or(Vec3f{})};
+  if (file.header.diffuse_color) out.field.diffuse = out.transfer.coefficients;
   if (file.header.sky) {
     out.field.sky = file.header.sky->mean;
     out.field.sky_slope = static_cast<float>(file.header.sky->slope);

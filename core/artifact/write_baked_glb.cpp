@@ -60,6 +60,7 @@ void check_shape(const BakedScene& baked) {
           (field.visibility.size() == kVisibilityCount * mesh.position.size() && baked.sky.size() >= 2));
   EXPECTS(field.lamps.size() <= kMostFieldLamps &&
           field.lamp_visibility.size() == field.lamps.size() * mesh.position.size());
+  EXPECTS(!field.has_diffuse() || (baked.transfer.order == 0 && baked.transfer.channels == 3));
   EXPECTS(std::ranges::all_of(baked.light.coefficients, [](const Vec3f& c) { return is_finite(c); }));
 }
 
@@ -191,17 +192,20 @@ class Writer {
     lobes_ = add_floats(baked_.lobes.numbers);
   }
 
-  /// The blurred skies that a field keeps apart, and how surfaces mirror them.
+  /// The blurred skies that a field keeps apart, and how surfaces mirror them and what they leave to diffuse layers.
   void add_sky() {
+    if (field_ && (field_->visibility() || baked_.field.has_diffuse()))
+      field_lobes_ = add_floats(albedo_table().numbers);
     if (!field_ || !field_->visibility()) return;
     sky_ = pack_sky(baked_.sky);
     sky_view_ = add_view({reinterpret_cast<const std::uint8_t*>(sky_.texels.data()), sky_.texels.size() * 4});
-    sky_lobes_ = add_floats(albedo_table().numbers);
   }
+
+  json field_lobes() const { return {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *field_lobes_}}; }
 
   json sky_extension() const {
     json out = {{"levels", {{"heights", sky_.heights}, {"unit", sky_.unit}, {"bufferView", *sky_view_}}},
-                {"lobes", {{"rows", kLobeRows}, {"views", kLobeViews}, {"bufferView", *sky_lobes_}}},
+                {"lobes", field_lobes()},
                 {"mean", vec(baked_.field.sky)},
                 {"slope", baked_.field.sky_slope}};
     put_form(out, field_->visibility()->form(), {}, sky_name);
@@ -266,8 +270,9 @@ class Writer {
   }
 
   json field_extension() const {
-    const bool emission = baked_.field.emission_apart;
-    json out = {{"version", emission          ? 3
+    const bool emission = baked_.field.emission_apart, diffuse = baked_.field.has_diffuse();
+    json out = {{"version", diffuse           ? 4
+                            : emission        ? 3
                             : field_->lamps() ? 2
                                               : 1},
                 {"basis", "real-sh"},
@@ -280,6 +285,7 @@ class Writer {
     if (field_->visibility()) out["sky"] = sky_extension();
     if (field_->lamps()) out["lamps"] = lamps_extension();
     if (emission) out["emissionApart"] = true;
+    if (diffuse) out["diffuse"] = {{"mean", vec(baked_.field.diffuse_color)}, {"lobes", field_lobes()}};
     return out;
   }
 
@@ -344,7 +350,7 @@ class Writer {
   std::optional<StoredGlossy> glossy_;
   std::optional<StoredField> field_;
   std::optional<std::size_t> components_, field_components_, glossy_rows_, lobes_, sky_view_,
-      sky_lobes_;  // buffer views
+      field_lobes_;  // buffer views
   PackedSky sky_;
   Bytes binary_;
   json views_ = json::array(), accessors_ = json::array(), images_ = json::array();

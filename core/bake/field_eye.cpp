@@ -10,13 +10,13 @@ FieldEye::FieldEye(const Scene& scene, const LightField& field, const SkyLevels&
 
 Vec3d FieldEye::seen(const SurfaceMatch& place, const Vec3d& normal, const Vec3d& view) const {
   FieldPoint at{scene_.mesh.triangles[place.triangle], place.u, place.v, normal, view};
-  const bool mirrors = sky_ || field_.has_lamps();
-  if (!mirrors && !field_.emission_apart) return seen_radiance(field_, nullptr, at);
+  const bool colored = sky_ || field_.has_lamps() || field_.has_diffuse();
+  if (!colored && !field_.emission_apart) return seen_radiance(field_, nullptr, at);
   const SurfacePoint point =
       surface_point(scene_, place.triangle, static_cast<float>(place.u), static_cast<float>(place.v));
-  if (mirrors) {
+  if (colored) {
     const EyeMaterial material = eye_material(scene_, point);
-    at.f0 = material.f0, at.roughness = material.roughness;
+    at.f0 = material.f0, at.roughness = material.roughness, at.color = material.diffuse;
     const std::vector<Vec3f>& corner = scene_.mesh.position;
     at.place = to_double(corner[at.triangle[0]]) * (1 - place.u - place.v) +
                to_double(corner[at.triangle[1]]) * place.u + to_double(corner[at.triangle[2]]) * place.v;

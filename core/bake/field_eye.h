@@ -1,6 +1,6 @@
 #pragma once
-// What an eye sees of a light field on its surface: core/lightfield/seen.h with the materials that mirror what the
-// field keeps apart, and emit it.
+// What an eye sees of a light field on its surface: core/lightfield/seen.h with the materials that mirror and colour
+// what the field keeps apart, and emit it.
 //
 // Keeps references. Images must have their pixels (decode_pixels).   Repeat  a pure function of its arguments
 

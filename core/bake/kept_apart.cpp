@@ -78,6 +78,15 @@ ApartDecision decide_emission(const Scene& scene) {
   return {textured, textured ? "textures glow, more sharply than vertices can say" : "no texture glows"};
 }
 
+ApartDecision decide_diffuse(const Scene& scene) {
+  const bool textured = std::ranges::any_of(scene.parts, [&](const Part& part) {
+    const Material& m = scene.materials[static_cast<std::size_t>(part.material)];
+    const bool shaped = m.metallic_roughness_texture.texture >= 0 && m.metallic > 0;
+    return shaped || (m.base_color_texture.texture >= 0 && m.metallic < 1);
+  });
+  return {textured, textured ? "textures colour it, more sharply than vertices can say" : "no texture colours it"};
+}
+
 std::optional<std::string> softened_emitters(const Scene& scene, int degree) {
   const bool glows = std::ranges::any_of(scene.parts, [&](const Part& part) {
     const Vec3f& emission = scene.materials[static_cast<std::size_t>(part.material)].emission;

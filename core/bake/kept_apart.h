@@ -26,6 +26,9 @@ ApartDecision decide_lamps(const Scene&);
 /// Emission is apart where a texture glows.
 ApartDecision decide_emission(const Scene&);
 
+/// Diffuse light is apart from base colour where textures colour or shape the diffuse layer.
+ApartDecision decide_diffuse(const Scene&);
+
 /// Surfaces that glow are never kept apart. Where a face is smooth enough to show them more sharply than bands 0 ..
 /// degree can, a sentence that says so.
 std::optional<std::string> softened_emitters(const Scene&, int degree);

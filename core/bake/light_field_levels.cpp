@@ -130,8 +130,9 @@ FieldLevels make_levels(const Mesh& mesh, const Transfer& transfer, LightField f
   double squares = 0;
   const auto add_level = [&] {
     squares += std::pow(last.error * unit, 2);
-    out.levels.push_back(
-        {last.lit.mesh, last.lit.field, light.at(last.lit.mesh, threads), std::sqrt(squares), last.reached});
+    const LightField& own = last.lit.field;
+    Transfer diffuse = own.has_diffuse() ? Transfer{0, 3, true, own.diffuse} : light.at(last.lit.mesh, threads);
+    out.levels.push_back({last.lit.mesh, own, std::move(diffuse), std::sqrt(squares), last.reached});
   };
   if (plan.simplify && plan.target) {
     last = coarsest(std::move(last), plan, unit, judge, out.baked, threads);

@@ -151,6 +151,9 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
   const ApartDecision emission = decide_emission(scene);
   f.outgoing.emission_apart = emission.apart;
   if (emission.apart) decide(plan, "emission", "apart", emission.reason);
+  const ApartDecision diffuse = decide_diffuse(scene);
+  f.outgoing.diffuse_apart = diffuse.apart;
+  if (diffuse.apart) decide(plan, "diffuse light", "apart", diffuse.reason);
   if (const auto softened = softened_emitters(scene, f.outgoing.degree)) {
     decide(plan, "emitters", "in the series", *softened);
     plan.warnings.push_back({"emitters_mirrored_softly", "Of this scene " + *softened + ".", "/steps/0/degree"});
@@ -162,7 +165,10 @@ Plan make_light_field_plan(const Scene& scene, const Recipe& recipe, const Envir
 }
 
 FinishSource::FinishSource(const Scene& scene)
-    : scene_(scene), nearest_(scene_.mesh), glow_apart_(decide_emission(scene).apart) {
+    : scene_(scene),
+      nearest_(scene_.mesh),
+      glow_apart_(decide_emission(scene).apart),
+      diffuse_apart_(decide_diffuse(scene).apart) {
   std::vector<TransferPoint> points;
   for (const Triangle& t : scene_.mesh.triangles) points.push_back(first_corner(scene_.mesh, t));
   scale_.fill(1);
@@ -185,8 +191,9 @@ std::vector<float> FinishSource::values(std::span<const TransferPoint> points, T
       if (!match) continue;
       const SurfacePoint p =
           surface_point(scene_, match->triangle, static_cast<float>(match->u), static_cast<float>(match->v));
-      const Vec3f color = albedo_at(scene_, p);
       const SurfaceFinish finish = finish_at(scene_, p);
+      Vec3f color = albedo_at(scene_, p);
+      if (diffuse_apart_) color = color * static_cast<float>(finish.metallic);
       const Vec3f glow = glow_apart_ ? Vec3f{} : emission_at(scene_, p);
       const std::array<float, kWidth> numbers{color.x, color.y, color.z,         glow.x,
                                               glow.y,  glow.z,  finish.metallic, finish.roughness};

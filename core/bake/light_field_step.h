@@ -38,7 +38,7 @@ class FinishSource {
  private:
   Scene scene_;
   ClosestPoint nearest_;
-  bool glow_apart_;  // emission is no reason to split
+  bool glow_apart_, diffuse_apart_;  // emission, colours of the diffuse layer are no reason to split
   std::array<float, kWidth> scale_{};
 };
 

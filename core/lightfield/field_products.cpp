@@ -48,7 +48,9 @@ std::vector<float> difference(std::span<const float> a, std::span<const float> b
 }  // namespace
 
 FieldProducts::FieldProducts(const LightField& field)
-    : field_(field), norm_(field.degree), euclid_(field.degree == 0 && !field.has_sky() && !field.has_lamps()) {
+    : field_(field),
+      norm_(field.degree),
+      euclid_(field.degree == 0 && !field.has_sky() && !field.has_lamps() && !field.has_diffuse()) {
   EXPECTS(euclid_ ? field.noise < field.channels : field.channels == 3 && field.noise == 0);
 }
 

@@ -11,10 +11,11 @@
 // Where a vertex mirrors the sky more sharply than the series can, the sky's part may be kept apart: then there is
 // `visibility` too, and L~ is the series and what mirrored_sky.h adds. Punctual lamps are kept apart in the same way:
 // then `lamps` and `lamp_visibility` are there, and lamp_highlights.h adds what surfaces mirror of them. Where textures
-// glow, emission is theirs (`emission_apart`), as sharp as they are: whoever shows the field adds it.
-// A field of degree 0 may have other channels: any attribute whose distance is Euclid's, like transfer vectors. If it
-// was drawn twice by chance, the first channels are the means of the draws and the last `noise` ones half of their
-// differences.
+// glow, emission is theirs (`emission_apart`), as sharp as they are: whoever shows the field adds it. Where textures
+// have colours, base colour is theirs too: then `diffuse` is there, the light that a white vertex would send, and
+// seen.h multiplies it by the colour of the place. A field of degree 0 may have other channels: any attribute whose
+// distance is Euclid's, like transfer vectors. If it was drawn twice by chance, the first channels are the means of the
+// draws and the last `noise` ones half of their differences.
 
 #include <array>
 #include <cstddef>
@@ -53,6 +54,8 @@ struct LightField {
   std::vector<FieldLamp> lamps;     // that are kept apart
   std::vector<float> lamp_visibility;  // of each of them at each vertex, 0 to 1
   bool emission_apart = false;         // what the surface's own material emits is not in the series
+  std::vector<float> diffuse;          // light of the diffuse layer at each vertex, RGB, at colour 1; or empty
+  Vec3f diffuse_color;                 // what such light of 1 adds, root mean square: for distances only
   std::size_t channels = 3;
   std::size_t noise = 0;
 
@@ -62,10 +65,15 @@ struct LightField {
   std::span<const float> of(std::size_t vertex) const { return {coefficients.data() + row() * vertex, row()}; }
   bool has_sky() const { return !visibility.empty(); }
   bool has_lamps() const { return !lamps.empty(); }
+  bool has_diffuse() const { return !diffuse.empty(); }
   std::span<float> of(std::size_t vertex) { return {coefficients.data() + row() * vertex, row()}; }
 };
 
-/// The series of a vertex as distances see it: with the sky's part, as if the sky were even, and blurred highlights.
+/// A field of no vertices whose rows are those of another.
+LightField empty_like(const LightField&);
+
+/// The series of a vertex as distances see it: with the sky's part, as if the sky were even, blurred highlights, and
+/// diffuse light on one colour for all.
 std::vector<double> mean_light(const LightField&, std::size_t vertex);
 
 /// Calls visit(array, numbers of a vertex) for each array of a field that has something.
@@ -74,6 +82,7 @@ void each_field_array(Field& field, const Visit& visit) {
   visit(field.coefficients, field.row());
   if (field.has_sky()) visit(field.visibility, kVisibilityCount);
   if (field.has_lamps()) visit(field.lamp_visibility, field.lamps.size());
+  if (field.has_diffuse()) visit(field.diffuse, 3);
 }
 
 /// Calls visit(array of a, array of b, numbers of a vertex) for each array that `b` has.
@@ -82,6 +91,7 @@ void each_field_array_of(FieldA& a, FieldB& b, const Visit& visit) {
   visit(a.coefficients, b.coefficients, b.row());
   if (b.has_sky()) visit(a.visibility, b.visibility, kVisibilityCount);
   if (b.has_lamps()) visit(a.lamp_visibility, b.lamp_visibility, b.lamps.size());
+  if (b.has_diffuse()) visit(a.diffuse, b.diffuse, 3);
 }
 
 }  // namespace kiln

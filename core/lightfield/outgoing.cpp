@@ -194,6 +194,7 @@ struct SharpVertex {
 struct VertexResult {
   double noise = 0, mean = 0;  // mean square over eyes and channels; radiance
   SharpVertex sharp;
+  Vec3f below;  // of its material
 };
 
 /// Fits what each vertex sends.
@@ -224,6 +225,7 @@ class VertexBake {
     const double apart = apart_ ? share_apart(material.roughness) : 0;
     VertexResult result;
     result.sharp.f0 = material.f0;
+    result.below = material.below;
     result.mean += take_lamps(looks, material);
     for (std::size_t k = 0; k < lamps_.size(); ++k)
       out.lamp_visibility[lamps_.size() * v + k] = share_seen(world_.tracer.scene().lights[lamps_[k]], point, rays);
@@ -236,7 +238,9 @@ class VertexBake {
     Halves halves{{LobeSum(fit), LobeSum(fit)}};
     halves.add(looks, apart > 0 ? &visibility : nullptr, basis_around(point.normal));
     const std::span<float> all = out.of(v);
-    result.noise = mix_halves(halves, material, material.below * value, all);
+    const Vec3f sent = material.below * value;
+    result.noise = mix_halves(halves, material, out.has_diffuse() ? Vec3f{} : sent, all);
+    if (out.has_diffuse()) result.mean += double{sent.x + sent.y + sent.z} / 3;
     for (std::size_t c = 0; c < 3; ++c) {
       float* series = &all[c * out.count()];
       rotate_sh(fits_.degree() + 1, basis_around(point.normal), series, series);
@@ -311,7 +315,8 @@ void add_sky(const Environment& sky, std::span<const VertexResult> vertices, Out
   constexpr double kTurn = 0.3;           // of the mirror direction, where vertices are few
   double least = 1, all = 0, squared_f0 = 0;
   Vec3d f0;
-  for (const auto& [noise, mean, v] : vertices) {
+  for (const VertexResult& vertex : vertices) {
+    const SharpVertex& v = vertex.sharp;
     if (!(v.share > 0)) continue;
     least = std::min(least, v.alpha);
     f0 += to_double(v.f0) * v.share;
@@ -371,6 +376,14 @@ void add_lamps(const std::vector<Light>& lights, std::span<const std::size_t> la
   }
 }
 
+/// Root mean square over vertices.
+Vec3f diffuse_color_of(std::span<const VertexResult> vertices) {
+  Vec3d squares;
+  for (const VertexResult& v : vertices) squares += to_double(v.below) * to_double(v.below);
+  squares = squares / static_cast<double>(std::max<std::size_t>(1, vertices.size()));
+  return to_float({std::sqrt(squares.x), std::sqrt(squares.y), std::sqrt(squares.z)});
+}
+
 }  // namespace
 
 double share_apart(double roughness) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
@@ -392,6 +405,9 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   out.field.coefficients.resize(3 * out.field.count() * points.size());
   if (vertex.sky_apart()) out.field.visibility.resize(kVisibilityCount * points.size());
   out.field.lamp_visibility.resize(lamps.size() * points.size());
+  if (params.diffuse_apart) {
+    for (const Vec3f& light : value) out.field.diffuse.insert(out.field.diffuse.end(), {light.x, light.y, light.z});
+  }
   std::vector<VertexResult> results(points.size());
   std::atomic<std::uint64_t> rays = 0, done = 0;
   threads.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -409,6 +425,7 @@ OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const V
   if (vertex.sky_apart()) add_sky(*world.sky, results, out, threads);
   go_on_behind_the_edge(scene.mesh, lamps.size(), out.field.lamp_visibility);
   add_lamps(scene.lights, lamps, points, results, out.field);
+  if (params.diffuse_apart) out.field.diffuse_color = diffuse_color_of(results);
   return out;
 }
 

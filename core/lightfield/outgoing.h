@@ -32,6 +32,8 @@ struct OutgoingBake {
   bool lamps_apart = false;
   /// Leaves what the surface emits to its materials.
   bool emission_apart = false;
+  /// Leaves the colours of the diffuse layer to them: the field has `value` itself.
+  bool diffuse_apart = false;
   std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};  // vertices
 };
 

@@ -17,13 +17,13 @@ static_assert(sizeof(Vec3f) == 12 && sizeof(Vec2f) == 8 && sizeof(Vec4f) == 16 &
 
 constexpr std::uint32_t kMagic = 0x4D504B32;  // "2KPM"
 constexpr std::uint32_t kHasUv0 = 1, kHasUv1 = 2, kHasColor = 4, kHasTangent = 8, kHasPart = 16, kHasSky = 32,
-                        kALamp = 64;  // the number of lamps times this is the rest of the word
+                        kALamp = 64, kHasDiffuse = 1024;  // kALamp times the number of lamps is between them
 
 struct Header {
   std::uint32_t magic = kMagic, degree = 0, has = 0, base_vertices = 0, base_triangles = 0, vertices = 0, triangles = 0,
                 splits = 0, turned = 0, moved = 0, rank = 0, wide = 0;
 
-  std::size_t lamps() const { return has / kALamp; }
+  std::size_t lamps() const { return has % kHasDiffuse / kALamp; }
   std::size_t stride() const { return 3 * static_cast<std::size_t>(sh_count(static_cast<int>(degree) + 1)); }
   std::size_t row_floats() const { return rank == 0 ? 0 : (rank + 1) * stride(); }
 };
@@ -70,6 +70,7 @@ void each_array(Progressive& p, AnyStored& stored, const Header& h, const Visit&
     if (h.has & kHasTangent) visit(lit.mesh.tangent, count);
     if (h.has & kHasSky) visit(lit.field.visibility, count * kVisibilityCount);
     visit(lit.field.lamp_visibility, count * h.lamps());
+    if (h.has & kHasDiffuse) visit(lit.field.diffuse, count * 3);
     visit(lit.field.coefficients, h.rank == 0 ? count * h.stride() : 0);
     visit(codes.wide, (count * h.wide + 1) / 2 * 2);
     visit(codes.narrow, (count * (h.rank - h.wide) + 3) / 4 * 4);
@@ -236,7 +237,8 @@ Result<bool> check_splits(const ProgressiveMesh& p) {
 std::vector<std::uint8_t> encode_progressive(const ProgressiveMesh& p, std::span<const float> rows, double step) {
   const auto size = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   Header h{.degree = static_cast<std::uint32_t>(p.all.field.degree),
-           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0) | kALamp * size(p.all.field.lamps),
+           .has = attributes_of(p.all.mesh) | (p.all.field.has_sky() ? kHasSky : 0) | kALamp * size(p.all.field.lamps) |
+                  (p.all.field.has_diffuse() ? kHasDiffuse : 0),
            .base_vertices = p.base_vertices,
            .base_triangles = p.base_triangles,
            .vertices = size(p.all.mesh.position),
@@ -274,7 +276,7 @@ Result<ProgressiveMesh> decode_progressive(std::span<const std::uint8_t> bytes) 
   if (bytes.size() < sizeof h) return fault("truncated", "The header is not whole.", "header");
   std::memcpy(&h, bytes.data(), sizeof h);
   if (h.magic != kMagic || h.degree > static_cast<std::uint32_t>(kMaxLightFieldDegree) || h.lamps() > kMostFieldLamps ||
-      h.rank > h.stride() || h.wide > h.rank)
+      h.has >= 2 * kHasDiffuse || h.rank > h.stride() || h.wide > h.rank)
     return fault("unsupported_version", "This is not a progressive mesh of a version that is known.", "header");
   if (h.base_vertices > h.vertices || h.base_triangles > h.triangles)
     return fault("slot_count_mismatch", "The base is larger than the whole.", "header");

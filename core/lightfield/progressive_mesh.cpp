@@ -42,12 +42,6 @@ Order order_of(const CollapseRecord& record) {
   return out;
 }
 
-LitMesh empty_like(const LitMesh& lit) {
-  return {
-      .mesh = {},
-      .field = {.degree = lit.field.degree, .coefficients = {}, .visibility = {}, .sky = {}, .lamps = lit.field.lamps}};
-}
-
 void set_vertex(LitMesh& to, std::uint32_t vertex, const LitMesh& from, std::uint32_t row) {
   each_attribute_of(to.mesh, from.mesh, [&](auto& a, const auto& b) { a[vertex] = b[row]; });
   each_field_array_of(to.field, from.field, [&](auto& a, const auto& b, std::size_t numbers) {
@@ -60,7 +54,7 @@ void set_vertex(LitMesh& to, std::uint32_t vertex, const LitMesh& from, std::uin
 ProgressiveMesh progressive_mesh(const CollapseRecord& record) {
   const Order order = order_of(record);
   ProgressiveMesh out;
-  out.all = empty_like(record.all), out.moved = empty_like(record.all);
+  out.all.field = out.moved.field = empty_like(record.all.field);
   for (const std::uint32_t v : order.vertices) append_vertex(out.all, record.all, v);
   for (const std::uint32_t t : order.triangles) {
     const auto& [a, b, c] = record.all.mesh.triangles[t];

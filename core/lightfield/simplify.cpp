@@ -25,12 +25,7 @@ class Simplifier {
         cost_(mesh_, params.geometry_weight, params.collapse, params.mean_square),
         reach_(mesh_, params.max_reach),
         age_(mesh_.points(), 0) {
-    if (params.record)
-      out_.record.before = {
-          .mesh = {},
-          .field = {
-              .degree = lit_.field.degree, .coefficients = {}, .visibility = {}, .sky = {}, .lamps = lit_.field.lamps}};
-    out_.record.before.field.emission_apart = lit_.field.emission_apart;
+    if (params.record) out_.record.before.field = empty_like(lit_.field);
   }
 
   SimplifyResult run() {

@@ -67,7 +67,7 @@ test('every coefficient has a half of its own, and no texel is left over', () =>
     for (let c = 0; c < 3; ++c) for (let i = 0; i < fieldCount(degree); ++i) places.add(halfAt(degree, i, c));
     assert.equal(places.size, 3 * fieldCount(degree));
     assert.equal(Math.max(...places), places.size - 1);
-    assert.equal(texelsOf({ degree, sky: false, lamps: 0 }), Math.ceil(places.size / 8));
+    assert.equal(texelsOf({ degree, sky: false, lamps: 0, diffuse: false }), Math.ceil(places.size / 8));
   }
 });
 
@@ -106,26 +106,28 @@ function triangleAt(parts, place) {
   throw new Error(`no triangle at ${place}`);
 }
 
-/// Base colour and finish of a part of the fixtures, which have no textures.
-function mirrorOf(json, part, { sky, lamps }) {
+/// Base colour and finish of a part of the fixtures, whose textures are white.
+function mirrorOf(json, part, { sky, lamps, lobes }) {
   if (!sky && lamps.length === 0) return undefined;
   const { baseColorFactor, metallicFactor, roughnessFactor } = json.materials[part].pbrMetallicRoughness;
   const f0 = baseColorFactor.slice(0, 3).map((c) => 0.04 * (1 - metallicFactor) + c * metallicFactor);
-  return { sky: sky && new MirroredSky(sky), lamps, f0, roughness: roughnessFactor };
+  const color = baseColorFactor.slice(0, 3).map((c) => c * (1 - metallicFactor));
+  return { sky: sky && new MirroredSky(sky), lamps, f0, roughness: roughnessFactor, color, lobes };
 }
 
-for (const name of ['field', 'sky', 'lamps'])
+for (const name of ['field', 'sky', 'lamps', 'textured'])
   test(`what an eye sees between three vertices is what kiln says: ${name}`, () => {
-    const { baked, sky, lamps } = unpack(draco, readPacked(bytesOf(fixture(`${name}.glb`))));
+    const { baked, sky, lamps, lobes } = unpack(draco, readPacked(bytesOf(fixture(`${name}.glb`))));
     assert.equal(sky !== null, name !== 'field');
+    assert.equal(baked[0].field.diffuse, name === 'textured');
     assert.deepEqual(lamps.map(({ type }) => type), name === 'lamps' ? ['point', 'spot', 'directional'] : []);
     const [names, ...lines] = fixture(`${name}.csv`).toString().trim().split('\n');
     assert.match(names, /^x,y,z,nx,ny,nz,vx,vy,vz,.*,radiance_r,radiance_g,radiance_b,distance$/);
     const rows = lines.map((line) => line.split(',').map(Number));
     const { json } = glbJson(fixture(`${name}.glb`));
-    const mirrors = baked.map((_, i) => mirrorOf(json, json.meshes[1].primitives[i].material, { sky, lamps }));
+    const mirrors = baked.map((_, i) => mirrorOf(json, json.meshes[1].primitives[i].material, { sky, lamps, lobes }));
     const { scale, translation } = json.nodes[json.scenes[0].nodes[0]];
-    let [below, mirrored, highlights] = [0, 0, 0];
+    let [below, mirrored, highlights, coloured] = [0, 0, 0, 0];
     for (const row of rows) {
       const [place, view, expected] = [row.slice(0, 3), row.slice(6, 9), row.slice(12, 15)];
       const inCube = place.map((x, a) => (x - translation[a]) / scale[a]);
@@ -136,7 +138,9 @@ for (const name of ['field', 'sky', 'lamps'])
       const bound = rounding(part.field, corners, weights, normal, view);
       const alone = seenRadiance(part.field, corners, weights, normal, view);
       const dark = mirror && seenRadiance(part.field, corners, weights, normal, view, { ...mirror, lamps: [] });
+      const black = mirror && seenRadiance(part.field, corners, weights, normal, view, { ...mirror, color: [0, 0, 0] });
       seenRadiance(part.field, corners, weights, normal, view, mirror).forEach((x, c) => {
+        if (mirror && x > 1.1 * black[c]) ++coloured;
         if (mirror && x > 1.1 * dark[c]) ++highlights;
         // and kiln looks the place up in floats: 2^-24 of the cube beside it, 1e-5 of a triangle; visibility is in halves
         const most = bound[c] + 1e-5 * (1 + x) + (mirror ? 8 * kHalfStep * x : 0);
@@ -147,6 +151,7 @@ for (const name of ['field', 'sky', 'lamps'])
     assert.ok(rows.length >= 80 && below >= 20, 'too few rows, or no eye below a horizon');
     assert.equal(mirrored > 20, name !== 'field', 'the sky is not in what is seen');
     assert.equal(highlights > 20, name === 'lamps', 'no lamp is in what is seen');
+    assert.equal(coloured > 20, name === 'textured', 'no diffuse light is in what is seen');
   });
 
 test('shared exponents are what they stand for', () => {
@@ -244,6 +249,26 @@ for (const [member, spoil] of Object.entries(kLampFaults))
     assert.throws(() => readLightField({ extensions: { KILN_light_field: e } }), place);
   });
 
+const kDiffuseFaults = {
+  diffuse: (diffuse) => (diffuse.mean = [0.5, -1, 0.5]),
+  'diffuse/lobes': (diffuse) => (diffuse.lobes.views = 33),
+};
+
+for (const [member, spoil] of Object.entries(kDiffuseFaults))
+  test(`a wrong ${member} is refused by its JSON pointer`, () => {
+    const e = structuredClone(glbJson(fixture('textured.glb')).json.extensions.KILN_light_field);
+    assert.equal(e.version, 4);
+    spoil(e.diffuse);
+    const place = new RegExp(`^Error: /extensions/KILN_light_field/${member}: `);
+    assert.throws(() => readLightField({ extensions: { KILN_light_field: e } }), place);
+  });
+
+test('diffuse light needs a transfer of order 0', () => {
+  const packed = readPacked(bytesOf(fixture('textured.glb')));
+  packed.extension.order = 1;
+  assert.throws(() => unpack(draco, packed), /diffuse: stands beside a transfer of order 0/);
+});
+
 test('a sky of the wrong size is refused', () => {
   const packed = readPacked(bytesOf(skyFile));
   packed.json.extensions.KILN_light_field.sky.levels.heights[0] = 64;
@@ -279,12 +304,13 @@ const kReport = {
   },
 };
 
-let browser, mock, skyMock, lampMock;
+let browser, mock, skyMock, lampMock, texturedMock;
 before(async () => {
   browser = await startBrowser();
   mock = await startMock({ files: { 'scene.glb': file, 'report.json': Buffer.from(JSON.stringify(kReport)) } });
   skyMock = await startMock({ files: { 'scene.glb': skyFile } });
   lampMock = await startMock({ files: { 'scene.glb': lampFile } });
+  texturedMock = await startMock({ files: { 'scene.glb': fixture('textured.glb') } });
   const { artifacts } = mock.jobs.get(jobId('done'));
   for (const name of ['lod2.glb', 'lod1.glb']) artifacts.push({ ...artifacts[0], name, bytes: fixture(name).length });
 });
@@ -293,6 +319,7 @@ after(async () => {
   await mock.close();
   await skyMock.close();
   await lampMock.close();
+  await texturedMock.close();
 });
 
 const address = (hash) => `${mock.url}/view/${jobId('done')}#${hash}`;
@@ -376,9 +403,9 @@ test('a pixel is what the reader sees there, from wherever one looks, and highli
 // Levels of the sky are brought to one resolution on the graphics card, in half floats.
 const kSkySteps = 3 / 255;
 
-for (const what of ['the sky', 'the sky and lamps'])
+for (const what of ['the sky', 'the sky and lamps', 'the sky above a texture'])
   test(`so is one that mirrors ${what}, at pixels and at vertices, and with every level in one file`, () =>
-    withApart(what === 'the sky' ? skyMock : lampMock, 'tone=none&ev=-2&background=off', async (page) => {
+    withApart({ 'the sky': skyMock, 'the sky and lamps': lampMock }[what] ?? texturedMock, 'tone=none&ev=-2&background=off', async (page) => {
       for (const pose of kPoses) {
         const { seen, exposure } = await look(page, pose);
         assert.ok(seen.length > 20);

@@ -1,10 +1,12 @@
-// node make_field.mjs OUT.glb [lamps] [smooth]: a small ball of brushed metal over a floor, for the fixtures of light
-// fields (fixtures/make_field.sh); with lamps a point, a spot and a sun above it. Smooth: of more triangles and
+// node make_field.mjs OUT.glb [lamps] [textured] [smooth]: a small ball of brushed metal over a floor, for the fixtures of light
+// fields (fixtures/make_field.sh); with lamps a point, a spot and a sun above it. Textured: with
+// a white texel as base colour, and half of the metal. Smooth: of more triangles and
 // roughness .25, for the picture of tests/bench/lamps_picture.sh.
 
 import { writeFileSync } from 'node:fs';
 
 const smooth = process.argv.includes('smooth');
+const textured = process.argv.includes('textured');
 const [across, rings] = smooth ? [96, 64] : [20, 12];
 const [radius, height] = [0.7, 0.75];
 const ball = { position: [], normal: [], index: [] };
@@ -34,7 +36,7 @@ function add(array, type, more = {}) {
   pieces.push(Buffer.from(array.buffer));
   views.push({ buffer: 0, byteOffset: length, byteLength: array.byteLength });
   length += array.byteLength;
-  const count = array.length / (type === 'VEC3' ? 3 : 1);
+  const count = array.length / { SCALAR: 1, VEC2: 2, VEC3: 3 }[type];
   const componentType = array instanceof Float32Array ? 5126 : 5125;
   return accessors.push({ bufferView: views.length - 1, componentType, count, type, ...more }) - 1;
 }
@@ -45,10 +47,16 @@ const bounds = (p) => ({
 const primitive = ({ position, normal, index }, material) => {
   const p = Float32Array.from(position);
   const attributes = { POSITION: add(p, 'VEC3', bounds([...p])), NORMAL: add(Float32Array.from(normal), 'VEC3') };
+  if (textured) attributes.TEXCOORD_0 = add(new Float32Array((2 * position.length) / 3).fill(0.5), 'VEC2');
   return { attributes, indices: add(Uint32Array.from(index), 'SCALAR'), material };
 };
 const finish = (baseColorFactor, metallicFactor, roughnessFactor) => ({
-  pbrMetallicRoughness: { baseColorFactor, metallicFactor, roughnessFactor },
+  pbrMetallicRoughness: {
+    baseColorFactor,
+    metallicFactor: textured ? metallicFactor / 2 : metallicFactor,
+    roughnessFactor,
+    ...(textured && { baseColorTexture: { index: 0 } }),
+  },
 });
 const json = {
   asset: { version: '2.0' },
@@ -61,6 +69,10 @@ const json = {
   bufferViews: views,
   buffers: [{ byteLength: length }],
 };
+if (textured) {
+  const white = 'iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==';
+  Object.assign(json, { textures: [{ source: 0 }], images: [{ uri: `data:image/png;base64,${white}` }] });
+}
 if (process.argv[3] === 'lamps') {
   const down = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2]; // a quarter turn about x: -z becomes -y
   const tilted = [-0.5, -0.3, 0.1, 0.8].map((x) => x / Math.hypot(0.5, 0.3, 0.1, 0.8));

@@ -75,7 +75,7 @@ TEST(LightFieldGlb, WhatIsNotRightIsRefusedByName) {
   EXPECT_EQ(code("\"degree\":2", "\"degree\":-1"), "json_type");
   EXPECT_EQ(code("\"reflected\":true", "\"reflected\":false"), "not_a_baked_scene");
   EXPECT_EQ(code("\"_SLF_0\",\"_SLF_1\"", "\"_SLF_1\",\"_SLF_0\""), "slot_count_mismatch");
-  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":4"), "unsupported_version");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":1", "\"KILN_light_field\":{\"version\":5"), "unsupported_version");
 }
 
 SkyLevels random_sky(float brightest) {
@@ -195,6 +195,40 @@ TEST(LightFieldGlb, LampsThatAreKeptApartTravelWithTheField) {
   EXPECT_GT(worst, 0.2 * 0.5 / 1023);
 }
 
+BakedScene with_diffuse() {
+  BakedScene out = with_field(2);
+  out.transfer = {0, 3, true, {}};
+  Random random(17, 0);
+  for (std::size_t i = 0; i < 3 * out.scene.mesh.position.size(); ++i)
+    out.transfer.coefficients.push_back(2 * random.uniform());
+  out.light.coefficients.clear();
+  out.field.diffuse = out.transfer.coefficients;
+  out.field.diffuse_color = {0.5F, 0.25F, 0.75F};
+  return out;
+}
+
+TEST(LightFieldGlb, DiffuseLightThatIsKeptApartIsTheTransfer) {
+  const BakedScene written = with_diffuse(), read = round_trip(written);
+  EXPECT_EQ(read.field.diffuse_color, written.field.diffuse_color);
+  EXPECT_EQ(read.field.diffuse, read.transfer.coefficients);
+  const double worst = worst_of(read.field.diffuse, written.field.diffuse, original_vertices(read));
+  EXPECT_LE(worst, 1.001 / 4095);  // twelve bits over a range of at most 2: half a step
+  EXPECT_GT(worst, 0.2 / 4095);
+  EXPECT_FALSE(round_trip(with_field(2)).field.has_diffuse());
+}
+
+TEST(LightFieldGlb, DiffuseLightThatIsNotRightIsRefusedByName) {
+  const Bytes file = *write_baked_glb(with_diffuse());
+  const auto code = [&](const std::string& from, const std::string& to) { return code_of(file, from, to); };
+  EXPECT_EQ(code("\"mean\":[0.5,0.25,0.75]", "\"mean\":[0.5,-0.25,0.75]"), "number_out_of_range");
+  EXPECT_EQ(code("\"mean\":[0.5,0.25,0.75]", "\"mean\":[0.5,0.25]"), "slot_count_mismatch");
+  EXPECT_EQ(code("\"rows\":16", "\"rows\":17"), "slot_count_mismatch");
+  // Beside a transfer of another order there is no such light.
+  const Bytes other = with_json(*write_baked_glb(with_field(2)), "\"reflected\":true",
+                                R"("reflected":true,"diffuse":{"mean":[1,1,1],"lobes":{"rows":16,"views":32}})");
+  EXPECT_EQ(read_baked_glb(other).error().code, "not_a_baked_scene");
+}
+
 TEST(LightFieldGlb, AFileSaysTheVersionThatItNeeds) {
   const auto version = [](const BakedScene& scene) {
     const Bytes file = *write_baked_glb(scene);
@@ -207,6 +241,7 @@ TEST(LightFieldGlb, AFileSaysTheVersionThatItNeeds) {
   BakedScene glowing = with_field(2);
   glowing.field.emission_apart = true;
   EXPECT_EQ(version(glowing), '3');
+  EXPECT_EQ(version(with_diffuse()), '4');
   EXPECT_TRUE(read_baked_glb(*write_baked_glb(glowing))->field.emission_apart);
   EXPECT_FALSE(read_baked_glb(*write_baked_glb(with_field(2)))->field.emission_apart);
 }
@@ -224,7 +259,7 @@ TEST(LightFieldGlb, LampsThatAreNotRightAreRefusedByName) {
   EXPECT_EQ(code("\"mean\":[0.5,1.0,2.0]", "\"mean\":[-1,1.0,2.0]"), "number_out_of_range");
   EXPECT_EQ(code("\"_SLF_LAMP_0\",\"_SLF_LAMP_1\"", "\"_SLF_LAMP_1\",\"_SLF_LAMP_0\""), "slot_count_mismatch");
   EXPECT_EQ(code("\"lights\":[{", "\"lights\":[],\"others\":[{"), "number_out_of_range");
-  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":2", "\"KILN_light_field\":{\"version\":4"), "unsupported_version");
+  EXPECT_EQ(code("\"KILN_light_field\":{\"version\":2", "\"KILN_light_field\":{\"version\":5"), "unsupported_version");
 }
 
 TEST(LightFieldGlb, AProgressiveMeshTravelsWithTheScene) {

@@ -11,6 +11,7 @@
 #include "core/bake/kept_apart.h"
 #include "core/bake/light_field_levels.h"
 #include "core/lightfield/polynomial_space.h"
+#include "core/prt/lobe_table.h"
 #include "tests/core/bake/bake_input.h"
 
 namespace kiln {
@@ -233,6 +234,27 @@ TEST(LightFieldEmission, OfTexturesIsApartAndAsSharpAsTheyAre) {
   EXPECT_NEAR(before.x, seen(0.55).x, 1e-12);  // weights sum to 1 within rounding
   field.emission_apart = true;
   EXPECT_NEAR(length(seen(0.45) - before - Vec3d{3, 2, 1}), 0, 1e-6);  // floats of materials
+  EXPECT_NEAR(length(seen(0.55) - before), 0, 1e-6);
+}
+
+/// Of four texels across the face the first two are white, the others black.
+TEST(LightFieldDiffuse, UnderTexturesIsApartAndAsSharpAsTheyAre) {
+  Scene scene = glowing_texture();
+  scene.materials[0].emission = {};
+  scene.materials[0].metallic = 0.5F;
+  EXPECT_FALSE(decide_diffuse(scene).apart);
+  scene.materials[0].base_color_texture.texture = 0;
+  EXPECT_TRUE(decide_diffuse(scene).apart);
+  scene.materials[0].metallic = 1;
+  EXPECT_FALSE(decide_diffuse(scene).apart);  // nothing is diffuse
+  scene.materials[0].metallic = 0;
+  LightField field{.degree = 0, .coefficients = std::vector<float>(9, 0.5F)};
+  const auto seen = [&](double u) { return FieldEye(scene, field, {}).seen({0, u, 0, 0}, {0, 0, 1}, {0, 0, 1}); };
+  const Vec3d before = seen(0.45);
+  field.diffuse = {1, 2, 3, 1, 2, 3, 1, 2, 3};
+  const Vec3d base = to_double(scene.materials[0].base_color);
+  const double left = 1 - lobe_at(albedo_table(), 1, double{scene.materials[0].roughness}).kept();
+  EXPECT_NEAR(length(seen(0.45) - before - base * Vec3d{1, 2, 3} * left), 0, 1e-6);  // floats of materials
   EXPECT_NEAR(length(seen(0.55) - before), 0, 1e-6);
 }
 

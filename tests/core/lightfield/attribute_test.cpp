@@ -85,6 +85,23 @@ TEST(FieldProducts, OfColoursAreThoseOfRadianceFunctions) {
   for (std::size_t i = 0; i < of_a.size(); ++i) EXPECT_NEAR(of_a[i], of_b[i], 1e-6);
 }
 
+/// Diffuse light that is kept apart counts as what it sends on the colour of the surface.
+TEST(FieldProducts, SeeDiffuseLightThatIsApart) {
+  constexpr float kWhite = 3.5449077F;  // 2 sqrt(pi)
+  LightField apart{.degree = 2, .coefficients = std::vector<float>(54, 0.25F)};
+  LightField together = apart;
+  apart.diffuse = {1, 2, 3, 1.5F, 1, 2};
+  apart.diffuse_color = {0.5F, 0.25F, 0.75F};
+  for (std::size_t v = 0; v < 2; ++v)
+    for (std::size_t c = 0; c < 3; ++c)
+      together.of(v)[9 * c] += kWhite * apart.diffuse_color[c] * apart.diffuse[3 * v + c];
+  const FieldProducts a(apart), b(together);
+  const Vec3d n{0, 0, 1};
+  EXPECT_NEAR(a.squared_distance(0, 1, n), b.squared_distance(0, 1, n), 1e-5);  // floats
+  EXPECT_NEAR(a.squared_norm(1, n), b.squared_norm(1, n), 1e-5);
+  EXPECT_GT(a.squared_distance(0, 1, n), 0.1);
+}
+
 TEST(FieldProducts, OfTwoDrawsAreFreeOfNoiseInTheMean) {
   const LitMesh lit = sheet(60, flat);
   const auto slope = [](const Vec3f& p, std::size_t c) { return c == 0 ? p.x : 0.0F; };

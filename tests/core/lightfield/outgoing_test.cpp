@@ -134,6 +134,41 @@ TEST(Outgoing, InTheOpenTheSkyIsAllApart) {
   EXPECT_TRUE(series.sky.empty());
 }
 
+/// Diffuse light that is left to the materials is what the series has of it, on a surface of one colour.
+TEST(Outgoing, DiffuseLightIsTheSameApart) {
+  Threads threads(2);
+  Scene scene = ball_and_wall(0.6F);
+  for (Material& m : scene.materials) m.metallic = 0.25F;
+  const Tracer tracer(scene, threads);
+  const Environment sky = overcast_sky();
+  const Made apart = make(tracer, sky, {.degree = 8, .rays = 256, .diffuse_apart = true}, threads);
+  const Made together = make(tracer, sky, {.degree = 8, .rays = 256}, threads);
+  ASSERT_TRUE(apart.light.field.has_diffuse());
+  EXPECT_FALSE(together.light.field.has_diffuse());
+  EXPECT_NEAR(apart.light.noise, together.light.noise, 0.02 * together.light.noise);  // noise / mean of the same rays
+  const Vec3d base{0.9, 0.6, 0.3};
+  double squares = 0, all = 0, most = 0;
+  for (std::uint32_t v = 30; v < 500; v += 7) {
+    Random random(3, v);
+    const Triangle t{v, v, v};
+    const Vec3d n = to_double(scene.mesh.normal[v]);
+    const FieldPoint at{.triangle = t,
+                        .normal = n,
+                        .view = random_view(n, random),
+                        .f0 = specular_f0(base, 0.25),
+                        .roughness = 0.6,
+                        .color = base * 0.75};
+    const Vec3d one = seen_radiance(apart.light.field, nullptr, at),
+                other = seen_radiance(together.light.field, nullptr, at);
+    squares += dot(one - other, one - other), all += dot(other, other);
+    FieldPoint black = at;
+    black.color = {};
+    most = std::max(most, length(seen_radiance(apart.light.field, nullptr, black)) / length(one));
+  }
+  EXPECT_LT(std::sqrt(squares / all), 0.02);  // what bands 0 to 8 leave of 1 - E, mostly near the horizon
+  EXPECT_LT(most, 0.9);                       // diffuse light is some of what is seen
+}
+
 TEST(Outgoing, RoughSurfacesKeepNoSkyApart) {
   EXPECT_EQ(share_apart(0.2), 1);
   EXPECT_EQ(share_apart(0.8), 0);

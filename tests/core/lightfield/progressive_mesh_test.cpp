@@ -146,9 +146,26 @@ TEST_P(Progressive, WhatIsSeenOfLampsComesBackToo) {
     EXPECT_FLOAT_EQ(finest.field.lamp_visibility[3 * v], 0.5F + 0.5F * std::sin(5 * finest.mesh.position[v].y));
 }
 
+TEST_P(Progressive, DiffuseLightComesBackBesideLamps) {
+  LitMesh lit = sample(12);
+  lit.field.lamps.resize(8);
+  lit.field.lamp_visibility.assign(8 * lit.mesh.position.size(), 0.5F);
+  for (const Vec3f& p : lit.mesh.position) lit.field.diffuse.insert(lit.field.diffuse.end(), {p.x, p.y, p.z});
+  lit.field.diffuse_color = {0.5F, 0.5F, 0.5F};
+  const ProgressiveMesh p = progressive_mesh(recorded(lit, GetParam()).record);
+  const auto back = decode_progressive(encode_progressive(p));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->all.field.lamps.size(), 8U);
+  const LitMesh finest = at_level(*back, p.levels() - 1);
+  ASSERT_EQ(finest.field.diffuse.size(), 3 * finest.mesh.position.size());
+  for (std::size_t v = 0; v < finest.mesh.position.size(); ++v)  // each with its own vertex
+    EXPECT_EQ(finest.field.diffuse[3 * v + 1], finest.mesh.position[v].y);
+}
+
 TEST(ProgressiveMesh, MoreLampsThanThereMayBeAreAFault) {
   auto bytes = encode_progressive(progressive_mesh(recorded(sample(4), Collapse::edge, 10).record));
-  bytes[9] |= 4;  // bit 10 of the attributes: 16 lamps
+  // Of the attributes bits 6 and 9: nine lamps; bit 11: nobody knows.
+  for (const auto& [byte, bits] : {std::pair{8, 64}, {9, 2 + 8}}) bytes[static_cast<std::size_t>(byte)] |= bits;
   const auto out = decode_progressive(bytes);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, "unsupported_version");

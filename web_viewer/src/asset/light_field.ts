@@ -4,17 +4,18 @@
 // is below. core/artifact/README.md specifies the format, core/lightfield/seen.h is the same in C++.
 //
 // Where the file keeps the sky apart (mirrored_sky.ts) or lamps (field_lamps.ts), what they add belongs to the sum. What a
-// vertex sees of them is interpolated too. Emission that is kept apart is the material's, and whoever shows it adds it.
+// vertex sees of them is interpolated too. Emission that is kept apart is the material's, and whoever shows it adds it. Where
+// diffuse light is apart it is interpolated, and multiplied by the colour of the place.
 //
 // A shader reads r-RFs as texels of eight halves: texel 3 g + c of a vertex holds coefficients 8 g .. 8 g + 7 of channel
-// c; what is left over follows, all of red first; then texels of what is seen of the sky, and of lamps. 16 bytes a texel: 160 a vertex at
+// c; what is left over follows, all of red first; then texels of what is seen of the sky, and of lamps, and of diffuse light. 16 bytes a texel: 160 a vertex at
 // degree 4, 304 at 6, 496 at 8.
 
 import { coefficientsOf } from '../light/transfer';
 import { evaluateSh } from '../light/sh';
 import { componentRows, type StoredTransfer } from './kiln_reader';
 import { checkLamps, type FieldLamp, type LampExtension, lampHighlights } from './field_lamps';
-import { checkSky, kVisibilityCount, type MirroredSky, type SkyExtension } from './mirrored_sky';
+import { checkLobes, checkSky, kVisibilityCount, lobeAt, type LobesExtension, type MirroredSky, type SkyExtension } from './mirrored_sky';
 
 /// The root extension, as written.
 export interface LightFieldExtension {
@@ -31,6 +32,13 @@ export interface LightFieldExtension {
   sky?: SkyExtension;
   lamps?: LampExtension; // of version 2
   emissionApart?: boolean; // of version 3
+  diffuse?: DiffuseExtension; // of version 4
+}
+
+/// `diffuse` of KILN_light_field, as written: the light is that of the transfer vectors.
+export interface DiffuseExtension {
+  mean: number[];
+  lobes: LobesExtension;
 }
 
 /// r-RFs of the vertices of one primitive.
@@ -39,15 +47,16 @@ export interface FieldTexels {
   sky: boolean; // the sky is kept apart
   lamps: number; // so many lamps are
   emission: boolean; // what the material emits is, too
+  diffuse: boolean; // and base colour from diffuse light
   halves: Uint16Array<ArrayBuffer>; // 8 * texelsOf(this) of each vertex
   unit: number; // a coefficient is unit * half; a power of two
 }
 
 /// What a field holds for each vertex.
-export type FieldShape = Pick<FieldTexels, 'degree' | 'sky' | 'lamps' | 'emission'>;
+export type FieldShape = Pick<FieldTexels, 'degree' | 'sky' | 'lamps' | 'emission' | 'diffuse'>;
 
 /// That part of a shape which says how many numbers a vertex has.
-type Numbers = Pick<FieldShape, 'degree' | 'sky' | 'lamps'>;
+type Numbers = Pick<FieldShape, 'degree' | 'sky' | 'lamps' | 'diffuse'>;
 
 const kName = 'KILN_light_field';
 const kMostDegree = 8;
@@ -59,9 +68,11 @@ export const fieldCount = (degree: number): number => (degree + 1) ** 2;
 const seriesTexels = (degree: number): number => Math.ceil((3 * fieldCount(degree)) / 8);
 
 /// Texels of a vertex.
-export const texelsOf = (shape: Numbers): number => firstLampTexel(shape) + Math.ceil(shape.lamps / 8);
+export const texelsOf = (shape: Numbers): number => diffuseTexel(shape) + Number(shape.diffuse);
 
-const firstLampTexel = ({ degree, sky }: Numbers): number =>
+const diffuseTexel = (shape: Numbers): number => firstLampTexel(shape) + Math.ceil(shape.lamps / 8);
+
+const firstLampTexel = ({ degree, sky }: Pick<Numbers, 'degree' | 'sky'>): number =>
   seriesTexels(degree) + (sky ? Math.ceil(kVisibilityCount / 8) : 0);
 
 /// Which half of a vertex is coefficient `i` of what it sees of the sky. Those are not in units.
@@ -69,6 +80,9 @@ export const skyHalfAt = (degree: number, i: number): number => 8 * seriesTexels
 
 /// Which one is how much it sees of lamp `k`.
 export const lampHalfAt = (shape: Numbers, k: number): number => 8 * firstLampTexel(shape) + k;
+
+/// Which one is channel `c` of its diffuse light, in units.
+export const diffuseHalfAt = (shape: Numbers, c: number): number => 8 * diffuseTexel(shape) + c;
 
 /// Which half of a vertex is coefficient `i` of channel `c`.
 export function halfAt(degree: number, i: number, c: number): number {
@@ -88,7 +102,7 @@ function checkField(e: LightFieldExtension): void {
   const must = (good: boolean, member: keyof LightFieldExtension, what: string) => {
     if (!good) throw new Error(`/extensions/${kName}/${member}: ${what}`);
   };
-  must([1, 2, 3].includes(e.version), 'version', `only versions 1 to 3 are read, this is ${e.version}`);
+  must([1, 2, 3, 4].includes(e.version), 'version', `only versions 1 to 4 are read, this is ${e.version}`);
   const basis = e.basis === 'real-sh' && e.condonShortley === false;
   must(basis, 'basis', 'must be real-sh without the Condon-Shortley phase');
   must(e.reflected === true, 'reflected', 'radiance functions must be reflected');
@@ -104,6 +118,12 @@ function checkField(e: LightFieldExtension): void {
   if (e.sky) checkSky(e.sky, `/extensions/${kName}/sky`);
   const flag = e.emissionApart === undefined || typeof e.emissionApart === 'boolean';
   must(flag, 'emissionApart', 'must be true or false');
+  if (e.diffuse) {
+    const { mean, lobes } = e.diffuse;
+    const colour = Array.isArray(mean) && mean.length === 3 && mean.every((x) => x >= 0 && Number.isFinite(x));
+    must(colour, 'diffuse', 'mean must be three numbers, none below zero');
+    checkLobes(lobes, `/extensions/${kName}/diffuse`);
+  }
   if (e.lamps) checkLamps(e.lamps, `/extensions/${kName}/lamps`);
 }
 
@@ -124,12 +144,12 @@ interface SeenNumbers {
   attributes: readonly Float32Array[];
 }
 
-/// `attributes`: the `_SLF_k` of a primitive; `apart`: its `_SLF_SKY_k` and `_SLF_LAMP_k`. Components are expanded, once:
+/// `attributes`: the `_SLF_k` of a primitive; `apart`: its `_SLF_SKY_k`, `_SLF_LAMP_k` and diffuse light. Components are expanded, once:
 /// rank * 3 (degree + 1)^2 products a vertex. Throws on what is not finite.
 export function fieldTexels(
   field: StoredTransfer,
   attributes: readonly Float32Array[],
-  apart: { sky?: SeenNumbers; lamps?: SeenNumbers; emission?: boolean } = {},
+  apart: { sky?: SeenNumbers; lamps?: SeenNumbers; emission?: boolean; diffuse?: Float32Array } = {},
 ): FieldTexels {
   const degree = field.order - 1;
   const stride = 3 * field.slots;
@@ -140,10 +160,13 @@ export function fieldTexels(
       sky: apart.sky !== undefined,
       lamps: apart.lamps?.extension.scale.length ?? 0,
       emission: apart.emission === true,
+      diffuse: apart.diffuse !== undefined,
     },
-    vertices, largestOf(field),
+    vertices,
+    Math.max(largestOf(field), largestIn(apart.diffuse ?? [])),
   );
-  const { series, visibility, lamps } = texelWriter(out);
+  const { series, visibility, lamps, diffuse } = texelWriter(out);
+  for (let v = 0; apart.diffuse && v < vertices; ++v) diffuse(v, apart.diffuse, 3 * v);
   for (let first = 0; first < vertices; first += kBatch) {
     const numbers = coefficientsOf(field, attributes.map((all) => all.subarray(4 * first, 4 * (first + kBatch))));
     for (let from = 0, v = first; from < numbers.length; from += stride, ++v) series(v, numbers, from);
@@ -160,14 +183,20 @@ export function fieldTexels(
   return out;
 }
 
+const largestIn = (numbers: ArrayLike<number>): number => {
+  let largest = 0;
+  for (let i = 0; i < numbers.length; ++i) largest = Math.max(largest, Math.abs(numbers[i]));
+  return largest;
+};
+
 /// Zeros, for coefficients of at most `largest`.
 export function emptyTexels(shape: FieldShape, vertices: number, largest: number): FieldTexels {
   const unit = 2 ** Math.ceil(Math.log2((largest || 1) / kLargestHalf));
   return { ...shape, halves: new Uint16Array(8 * texelsOf(shape) * vertices), unit };
 }
 
-/// Functions that write the coefficients of a vertex, those of red first, or what it sees of the sky or of lamps; they stand
-/// at `from` of `numbers`.
+/// Functions that write the coefficients of a vertex, those of red first, what it sees of the sky or of lamps, or its diffuse
+/// light; they stand at `from` of `numbers`.
 export function texelWriter(field: FieldTexels) {
   const { degree, halves, unit } = field;
   const [count, width] = [fieldCount(degree), 8 * texelsOf(field)];
@@ -183,6 +212,10 @@ export function texelWriter(field: FieldTexels) {
     lamps: (vertex: number, numbers: Float32Array, from: number): void => {
       for (let k = 0; k < field.lamps; ++k)
         halves[width * vertex + lampHalfAt(field, k)] = halfOf(numbers[from + k]);
+    },
+    diffuse: (vertex: number, numbers: Float32Array, from: number): void => {
+      for (let c = 0; c < 3; ++c)
+        halves[width * vertex + diffuseHalfAt(field, c)] = halfOf(numbers[from + c] / unit);
     },
   };
 }
@@ -228,13 +261,15 @@ export function reflectedView(normal: Vector, view: Vector): Vector {
   return normal.map((n, a) => 2 * Math.max(0, above) * n - (size > 0 ? raised[a] / size : n)) as unknown as Vector;
 }
 
-/// What mirrors the sky and lamps at a place, and these.
+/// What mirrors the sky and lamps at a place, and these; what colours diffuse light there.
 export interface Mirror {
   sky: MirroredSky | null;
   lamps: readonly FieldLamp[];
   place: Vector; // unit cube
   f0: Vector;
   roughness: number;
+  color: Vector; // (1 - metallic) base colour
+  lobes: Float32Array | null; // the table, where diffuse light is apart
 }
 
 /// Where the sky is apart nothing is less than this share of the series' own mean (core/lightfield/seen.h).
@@ -259,14 +294,18 @@ export function seenRadiance(
     (c) => field.unit * y.reduce((sum, yi, i) => sum + yi * mixed(halfAt(field.degree, i, c)), 0),
   );
   if (!mirror) return series.map((x) => Math.max(0, x));
-  const { sky, lamps, place, f0, roughness } = mirror;
+  const { sky, lamps, place, f0, roughness, color, lobes } = mirror;
   const above = dot(normal, r);
   const raised = normal.map((n, a) => 2 * above * n - r[a]) as unknown as Vector;
   const visibility = Array.from({ length: kVisibilityCount }, (_, i) => mixed(skyHalfAt(field.degree, i)));
   const seen = Array.from({ length: field.lamps }, (_, k) => mixed(lampHalfAt(field, k)));
   const ofSky = field.sky && sky ? sky.seen(normal, raised, f0, roughness, visibility) : [0, 0, 0];
   const ofLamps = lampHighlights(lamps.slice(0, field.lamps), seen, { place, normal, view: raised, f0, roughness });
-  const mean = (c: number): number => field.unit * y[0] * mixed(halfAt(field.degree, 0, c));
+  const [a, b] = field.diffuse && lobes ? lobeAt(lobes, Math.max(0, above), roughness) : [0, 0];
+  const sent = [0, 1, 2].map((c) =>
+    field.diffuse ? color[c] * (1 - 0.04 * a - b) * field.unit * mixed(diffuseHalfAt(field, c)) : 0,
+  );
+  const mean = (c: number): number => field.unit * y[0] * mixed(halfAt(field.degree, 0, c)) + sent[c];
   const least = [0, 1, 2].map((c) => (field.sky ? kLeastSeen * Math.max(0, mean(c)) : 0));
-  return series.map((x, c) => Math.max(least[c], x + ofSky[c] + ofLamps[c]));
+  return series.map((x, c) => Math.max(least[c], x + sent[c] + ofSky[c] + ofLamps[c]));
 }

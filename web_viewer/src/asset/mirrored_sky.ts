@@ -11,7 +11,14 @@ export interface SkyExtension {
   scale: number[];
   offset: number[];
   levels: { heights: number[]; unit: number; bufferView: number };
-  lobes: { rows: number; views: number; bufferView: number };
+  lobes: LobesExtension;
+}
+
+/// How surfaces of each roughness mirror and keep light: 16 rows of 32 views, three numbers each.
+export interface LobesExtension {
+  rows: number;
+  views: number;
+  bufferView: number;
 }
 
 /// What the worker hands out of it.
@@ -43,7 +50,19 @@ export function checkSky(sky: SkyExtension, place: string): void {
   const fits = (height: number) => Number.isInteger(height) && height >= 2 && height <= kMostHeight;
   must(heights?.length >= 2 && heights.length <= kMostLevels && heights.every(fits), 'levels/heights', 'must be 2 to 32');
   must(unit > 0 && Number.isFinite(unit), 'levels/unit', 'must be above zero');
-  must(sky.lobes?.rows === kLobeRows && sky.lobes.views === kLobeViews, 'lobes', 'must have 16 rows of 32 views');
+  checkLobes(sky.lobes, place);
+}
+
+export function checkLobes(lobes: LobesExtension | undefined, place: string): void {
+  if (lobes?.rows !== kLobeRows || lobes.views !== kLobeViews)
+    throw new Error(`${place}/lobes: must have 16 rows of 32 views`);
+}
+
+export function readLobes(lobes: LobesExtension, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): Float32Array<ArrayBuffer> {
+  const bytes = bytesIn(lobes.bufferView).slice();
+  const count = 3 * kLobeRows * kLobeViews;
+  if (bytes.byteLength !== 4 * count) throw new Error(`the lobes of the light field need ${4 * count} bytes`);
+  return new Float32Array(bytes.buffer);
 }
 
 /// `bytesIn`: of a buffer view. Throws where its length is another.
@@ -55,7 +74,7 @@ export function readSky(sky: SkyExtension, bytesIn: (view: number) => Uint8Array
     return bytes.buffer;
   };
   const texels = heights.reduce((sum, height) => sum + 2 * height * height, 0);
-  const lobes = new Float32Array(whole(sky.lobes.bufferView, 3 * kLobeRows * kLobeViews));
+  const lobes = readLobes(sky.lobes, bytesIn);
   return { heights, unit, texels: new Uint32Array(whole(bufferView, texels)), lobes };
 }
 
@@ -124,7 +143,7 @@ export class MirroredSky {
       for (let c = 0; c < 3; ++c) sum[c] += light[c] * weight;
       all += 1 / masking;
     }
-    const [a, b] = this.lobeAt(z, roughness);
+    const [a, b] = lobeAt(this.data.lobes, z, roughness);
     return sum.map((s, c) => (all > 0 ? ((f0[c] * a + b) * s) / all : 0));
   }
 
@@ -151,18 +170,18 @@ export class MirroredSky {
     }
     return sum;
   }
+}
 
-  private lobeAt(z: number, roughness: number): [number, number] {
-    const { lobes } = this.data;
-    const [row, view] = [clamp(roughness, 0, 1) * (kLobeRows - 1), (Math.acos(z) / (Math.PI / 2)) * (kLobeViews - 1)];
-    const [r, v] = [Math.min(Math.floor(row), kLobeRows - 2), Math.min(Math.floor(view), kLobeViews - 2)];
-    const mix = (k: number) => {
-      const entry = (i: number, j: number) => lobes[3 * ((r + i) * kLobeViews + v + j) + k];
-      const between = (i: number) => entry(i, 0) + (entry(i, 1) - entry(i, 0)) * (view - v);
-      return between(0) + (between(1) - between(0)) * (row - r);
-    };
-    return [mix(0), mix(1)];
-  }
+/// a and b: of the lobe's albedo F0 a + b for an eye whose cosine is z.
+export function lobeAt(lobes: Float32Array, z: number, roughness: number): [number, number] {
+  const [row, view] = [clamp(roughness, 0, 1) * (kLobeRows - 1), (Math.acos(clamp(z, 0, 1)) / (Math.PI / 2)) * (kLobeViews - 1)];
+  const [r, v] = [Math.min(Math.floor(row), kLobeRows - 2), Math.min(Math.floor(view), kLobeViews - 2)];
+  const mix = (k: number) => {
+    const entry = (i: number, j: number) => lobes[3 * ((r + i) * kLobeViews + v + j) + k];
+    const between = (i: number) => entry(i, 0) + (entry(i, 1) - entry(i, 0)) * (view - v);
+    return between(0) + (between(1) - between(0)) * (row - r);
+  };
+  return [mix(0), mix(1)];
 }
 
 /// How much of the sky is seen along w.

@@ -8,7 +8,8 @@ import { DracoMesh, type DracoModule } from './draco_mesh';
 import { joinGlb, padded, splitGlb } from './glb';
 import { type FieldTexels, fieldTexels, readLightField, storedField } from './light_field';
 import type { FieldLamp, LampExtension } from './field_lamps';
-import { readSky, type SkyData, type SkyExtension } from './mirrored_sky';
+import { readLobes, readSky, type SkyData, type SkyExtension } from './mirrored_sky';
+import { coefficientsOf } from '../light/transfer';
 import { type LightLinks, type LinksExtension, readLinks } from '../light/links';
 import { type PointField, type PointsExtension, readPoints } from './point_field';
 import {
@@ -39,13 +40,15 @@ export interface Unpacked {
   progressive: Uint8Array<ArrayBuffer> | null; // the bytes of KILN_progressive_mesh
   sky: SkyData | null; // that the light field keeps apart
   lamps: FieldLamp[]; // that it keeps apart too
+  lobes: Float32Array<ArrayBuffer> | null; // where it keeps the sky or diffuse light apart
 }
 
 /// A light field on its way out of the file.
 interface StoredField {
   series: StoredTransfer;
-  apart: { sky?: SkyExtension; lamps?: LampExtension; emission?: boolean };
+  apart: { sky?: SkyExtension; lamps?: LampExtension; emission?: boolean; diffuse: boolean };
   sky: SkyData | null;
+  lobes: Float32Array<ArrayBuffer> | null;
 }
 
 interface Json {
@@ -116,6 +119,8 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
   const baked = new Map<Primitive, BakedPrimitive>();
   const { links, points } = takeMeshless(json, bytesIn);
   const field = takeField(json, bytesIn);
+  if (field?.apart.diffuse && (transfer.order !== 0 || transfer.channels !== 3))
+    throw new Error(`/extensions/${kField}/diffuse: stands beside a transfer of order 0 with three channels`);
   const progressive = takeProgressive(json, bytesIn);
   const out = new Binary();
   moveImages(json, binary, out);
@@ -126,7 +131,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     const mesh = new DracoMesh(draco, bytes);
     try {
       for (const primitive of sharing) {
-        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, extension, field));
+        if (isBaked(primitive)) baked.set(primitive, takeBaked(primitive, mesh, transfer, field));
         makePlain(primitive, json, mesh, { accessors, out });
       }
     } finally {
@@ -148,6 +153,7 @@ export function unpack(draco: DracoModule, { json, binary, extension }: Packed):
     progressive,
     sky: field?.sky ?? null,
     lamps: field?.apart.lamps?.lights ?? [],
+    lobes: field?.lobes ?? null,
   };
 }
 
@@ -168,9 +174,11 @@ function takeMeshless(json: Json, bytesIn: (view: number) => Uint8Array): Pick<U
 function takeField(json: Json, bytesIn: (view: number) => Uint8Array<ArrayBuffer>): StoredField | null {
   const extension = readLightField(json);
   if (!extension) return null;
-  const { sky, lamps, emissionApart: emission } = takeExtension(json, kField, extension);
+  const { sky, lamps, emissionApart: emission, diffuse } = takeExtension(json, kField, extension);
   const series = storedField(extension, bytesIn);
-  return { series, apart: { sky, lamps, emission }, sky: sky ? readSky(sky, bytesIn) : null };
+  const seen = sky ? readSky(sky, bytesIn) : null;
+  const lobes = seen?.lobes ?? (diffuse ? readLobes(diffuse.lobes, bytesIn) : null);
+  return { series, apart: { sky, lamps, emission, diffuse: diffuse !== undefined }, sky: seen, lobes };
 }
 
 /// A copy: light/progressive_mesh.ts reads it when it is asked for.
@@ -255,7 +263,7 @@ function byCompressedBytes(
 function takeBaked(
   primitive: Primitive,
   mesh: DracoMesh,
-  extension: RadianceTransferExtension,
+  transfer: StoredTransfer,
   light: StoredField | null,
 ): BakedPrimitive {
   const ids = primitive.extensions![kDraco]!.attributes;
@@ -264,13 +272,14 @@ function takeBaked(
     return mesh.floats(ids[name], components);
   };
   const own = primitive.extensions!.KILN_radiance_transfer as { glossy?: boolean };
-  const [names, matrices] = [extension.attributes, own.glossy ? (extension.glossy?.attributes ?? []) : []];
+  const [names, matrices] = [transfer.attributes, own.glossy ? (transfer.glossy?.attributes ?? []) : []];
   const [stored, weights] = [names, matrices].map((list) => list.map((name) => floatsOf(name, 4)));
   const all = (list: readonly string[]) => list.map((name) => floatsOf(name, 4));
-  const { sky, lamps, emission } = light?.apart ?? {};
+  const { sky, lamps, emission, diffuse } = light?.apart ?? {};
   const seen = <T extends { attributes: string[] }>(extension: T | undefined) =>
     extension && { extension, attributes: all(extension.attributes) };
-  const numbers = { sky: seen(sky), lamps: seen(lamps), emission };
+  const ownLight = diffuse ? coefficientsOf(transfer, stored) : undefined;
+  const numbers = { sky: seen(sky), lamps: seen(lamps), emission, diffuse: ownLight };
   const field = light && fieldTexels(light.series, all(light.series.attributes), numbers);
   const apart = [light?.series, sky, lamps].flatMap((one) => one?.attributes ?? []);
   const taken = [...names, ...matrices, ...apart, 'COLOR_0'];

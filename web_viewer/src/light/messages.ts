@@ -73,7 +73,7 @@ export interface ProjectReply {
 export type Reply = { serial: number } & (
   | { begun: true }
   // a GLB without compression and without transfer vectors; of links the senders' samples: place and normal of each, six
-  // numbers; the light field of each part, and the sky and lamps it keeps apart; the light on points; the bytes of a
+  // numbers; the light field of each part, the sky and lamps it keeps apart, and how surfaces mirror; the light on points; the bytes of a
   // progressive mesh
   | {
       opened: ArrayBuffer;
@@ -81,6 +81,7 @@ export type Reply = { serial: number } & (
       field: FieldTexels[] | null;
       sky: SkyData | null;
       lamps: FieldLamp[];
+      lobes: Float32Array | null;
       points: PointField | null;
       progressive: Uint8Array<ArrayBuffer> | null;
     }

@@ -33,7 +33,8 @@ const kError = 4;
 const kMostNew = 6; // vertices of a split
 const kMostDegree = 8;
 const kPart = 16; // of `has`
-const kALamp = 64; // of the rest of it: times the number of lamps
+const kALamp = 64; // times the number of lamps, below kDiffuse
+const kDiffuse = 1024;
 const kOptional = [
   { bit: 1, name: 'uv0', width: 2 },
   { bit: 2, name: 'uv1', width: 2 },
@@ -41,6 +42,8 @@ const kOptional = [
   { bit: 8, name: 'tangent', width: 4 },
   { bit: 32, name: 'visibility', width: kVisibilityCount },
 ] as const;
+
+const lampsOf = (has: number): number => Math.floor((has % kDiffuse) / kALamp);
 
 function fail(what: string): never {
   throw new Error(`${kName}: ${what}`);
@@ -53,19 +56,20 @@ function readHeader(buffer: ArrayBuffer): Header {
     0,
     kHeader / 4,
   );
-  if (magic !== kMagic || degree > kMostDegree || has >= kALamp * (kMostLamps + 1) || rank > 3 * (degree + 1) ** 2 || wide > rank)
+  if (magic !== kMagic || degree > kMostDegree || lampsOf(has) > kMostLamps || has >= 2 * kDiffuse || rank > 3 * (degree + 1) ** 2 || wide > rank)
     fail('the version is not known');
   return { degree, has, baseVertices, baseTriangles, vertices, triangles, splits, turned, moved, rank, wide };
 }
 
 /// Columns of vertices in the order of the file.
 function columnsOf(h: Header): { name: string; width: number }[] {
-  const lamps = Math.floor(h.has / kALamp);
+  const lamps = lampsOf(h.has);
   return [
     { name: 'position', width: 3 },
     { name: 'normal', width: 3 },
     ...kOptional.filter(({ bit }) => h.has & bit),
     ...(lamps > 0 ? [{ name: 'lamps', width: lamps }] : []),
+    ...(h.has & kDiffuse ? [{ name: 'diffuse', width: 3 }] : []),
     { name: 'coefficients', width: 3 * (h.degree + 1) ** 2 },
   ];
 }

@@ -24,6 +24,7 @@ export class Relighter {
   /// What that keeps apart; null: nothing.
   sky: SkyData | null = null;
   lamps: FieldLamp[] = [];
+  lobes: Float32Array | null = null;
   /// Its light on points; null: it has none.
   points: PointField | null = null;
   /// The bytes of its progressive mesh; null: it has none.
@@ -43,7 +44,7 @@ export class Relighter {
     const reply = await this.ask({ kind: 'open', file }, [file]);
     if (!('opened' in reply)) throw new Error('the light worker answered another question');
     ({ samples: this.samples, field: this.field, progressive: this.progressive } = reply);
-    ({ sky: this.sky, lamps: this.lamps, points: this.points } = reply);
+    ({ sky: this.sky, lamps: this.lamps, lobes: this.lobes, points: this.points } = reply);
     return reply.opened;
   }
 

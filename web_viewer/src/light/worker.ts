@@ -30,7 +30,7 @@ let parts: BakedPrimitive[] = [];
 let links: LightLinks | null = null;
 let coefficients: Float32Array[] | null = null; // made when a false colour first asks for them
 
-async function open({ file }: OpenRequest): Promise<Pick<Unpacked, 'file' | 'points' | 'progressive' | 'sky' | 'lamps'>> {
+async function open({ file }: OpenRequest): Promise<Pick<Unpacked, 'file' | 'points' | 'progressive' | 'sky' | 'lamps' | 'lobes'>> {
   const unpacked = unpack(await decoder, readPacked(file));
   [transfer, arriving, parts] = [unpacked.transfer, unpacked.arriving, unpacked.baked];
   links = unpacked.links;
@@ -149,13 +149,13 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
   const { serial } = data;
   try {
     if (data.kind === 'open') {
-      const { file: opened, points, progressive, sky, lamps } = await open(data);
+      const { file: opened, points, progressive, sky, lamps, lobes } = await open(data);
       const samples = links && samplesOf(links);
       const field = takeField();
       const numbers = points ? [points.sites, points.normals, points.coefficients] : [];
       const halves = (field ?? []).map((part) => part.halves);
-      const give = [samples, progressive, ...numbers, ...halves, ...(sky ? [sky.texels, sky.lobes] : [])].filter((one) => one !== null);
-      send({ serial, opened, samples, field, sky, lamps, points, progressive }, [opened, ...give.map(({ buffer }) => buffer)]);
+      const give = [samples, progressive, ...numbers, ...halves, lobes, sky?.texels].filter((one) => one != null);
+      send({ serial, opened, samples, field, sky, lamps, lobes, points, progressive }, [opened, ...give.map(({ buffer }) => buffer)]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
       send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);

@@ -39,20 +39,24 @@ export class FieldLook {
   private readonly parts: Dressed[];
   /// What the field keeps apart; null: nothing.
   readonly sky: SkyLook | null = null;
+  readonly lobes: Texture | null = null;
   private readonly mirrored: MirroredSky | null = null;
+  private readonly table: Float32Array | null;
 
   readonly lamps: readonly FieldLamp[];
 
   /// `most`: texels that a texture may have across. Throws where a part needs more.
-  constructor(model: BakedModel, field: readonly FieldTexels[], apart: { sky: SkyData | null; lamps: FieldLamp[] }, most: number) {
-    const { sky, lamps } = apart;
+  constructor(model: BakedModel, field: readonly FieldTexels[], apart: { sky: SkyData | null; lamps: FieldLamp[]; lobes: Float32Array | null }, most: number) {
+    const { sky, lamps, lobes } = apart;
     this.lamps = lamps;
+    this.table = lobes;
+    if (lobes) this.lobes = lobeTexture(lobes, 1);
     this.degree = field[0].degree;
     this.emission = field[0].emission;
     this.bytes = field.reduce((sum, { halves }) => sum + halves.byteLength, 0);
     if (sky) {
       this.mirrored = new MirroredSky(sky);
-      this.sky = { texture: skyTexture(this.mirrored), unit: sky.unit, lobes: lobeTexture(sky.lobes, 1) };
+      this.sky = { texture: skyTexture(this.mirrored), unit: sky.unit };
       this.bytes += this.sky.texture.image.data!.byteLength;
     }
     this.parts = model.parts.map((part, i) => dress(part, field[i], this, most));
@@ -84,8 +88,8 @@ export class FieldLook {
     corners.forEach((v, k) =>
       place.addScaledVector(new Vector3().fromBufferAttribute(attributes.position, v), weights[k]),
     );
-    const { mirrored: sky, lamps } = this;
-    const mirror = { sky, lamps, place: place.toArray(), ...mirroringAt(part.part, corners, weights) };
+    const { mirrored: sky, lamps, table: lobes } = this;
+    const mirror = { sky, lamps, lobes, place: place.toArray(), ...mirroringAt(part.part, corners, weights) };
     const seen = seenRadiance(part.texels, corners, weights, normal.normalize().toArray(), view.toArray(), mirror);
     if (!part.texels.emission) return seen;
     const emitted = emissionAt(part.part, corners, weights);
@@ -95,7 +99,7 @@ export class FieldLook {
   dispose(): void {
     this.show(null);
     this.sky?.texture.dispose();
-    this.sky?.lobes.dispose();
+    this.lobes?.dispose();
     for (const { split, texture, materials } of this.parts) {
       split.dispose();
       texture.dispose();
@@ -104,27 +108,28 @@ export class FieldLook {
   }
 }
 
-function dress(part: BakedPart, field: FieldTexels, { sky, lamps }: FieldLook, most: number): Dressed {
+function dress(part: BakedPart, field: FieldTexels, { sky, lamps, lobes }: FieldLook, most: number): Dressed {
   const { mesh, geometry, material, unlit, albedo, finish, glow, emission } = part;
   const own = { geometry, material };
   const { texture, texels } = fieldTexture(field, most);
   const vertexAlbedo = own.geometry.hasAttribute('_albedo');
-  const look = { unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo };
+  const look = { unlit, albedo, finish, glow, emission, sky, lamps, lobes, vertexAlbedo };
   const surface = { shape: field, texture, unit: field.unit, ...look };
   const materials = { fragment: fieldMaterial(surface, false), vertex: fieldMaterial(surface, true) };
   return { part, mesh, own, split: splitTriangles(own.geometry), texture, materials, texels };
 }
 
-/// How the surface mirrors there.
+/// How the surface mirrors there, and colours diffuse light.
 function mirroringAt(
   part: BakedPart,
   corners: readonly number[],
   weights: readonly number[],
-): Pick<Mirror, 'f0' | 'roughness'> {
+): Pick<Mirror, 'f0' | 'roughness' | 'color'> {
   const base = colourAt(part, corners, weights);
   const [roughness, metallic] = finishAt(part, corners, weights);
-  const f0 = base.map((c) => 0.04 * (1 - metallic) + c * metallic) as [number, number, number];
-  return { f0, roughness };
+  type Three = [number, number, number];
+  const f0 = base.map((c) => 0.04 * (1 - metallic) + c * metallic) as Three;
+  return { f0, roughness, color: base.map((c) => c * (1 - metallic)) as Three };
 }
 
 const kKept = ['position', 'normal', 'uv', 'uv1', '_albedo'];

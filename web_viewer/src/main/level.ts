@@ -53,7 +53,7 @@ export class Level {
 
   /// Takes relighter, which has opened the file. `most`: texels that a texture may have across.
   static async create(asset: LoadedAsset, relighter: Relighter, most: number): Promise<Level> {
-    return new Level(asset, await BakedModel.create(asset, relighter.sky !== null || relighter.lamps.length > 0), relighter, most);
+    return new Level(asset, await BakedModel.create(asset, relighter.lobes !== null || relighter.lamps.length > 0), relighter, most);
   }
 
   dispose(): void {

@@ -73,7 +73,7 @@ interface Part {
 }
 
 /// What the light field keeps apart.
-type Apart = Pick<FieldLook, 'sky' | 'lamps'>;
+type Apart = Pick<FieldLook, 'sky' | 'lamps' | 'lobes'>;
 
 const kAttributes = [
   ['position', 'position'],
@@ -96,6 +96,7 @@ class ProgressiveShape {
   constructor(bytes: Uint8Array, { model, stage, level }: Viewer) {
     const sky = level.field?.sky ?? null;
     const lamps = level.field?.lamps ?? [];
+    const lobes = level.field?.lobes ?? null;
     this.mesh = new ProgressiveMesh(bytes);
     if (this.mesh.part.some((part) => part >= model.parts.length))
       throw new Error('The progressive mesh has parts that the scene has not.');
@@ -104,15 +105,18 @@ class ProgressiveShape {
     const all = light.values.length / light.width;
     const { degree, columns } = this.mesh;
     const emission = level.field?.emission ?? false;
-    const shape = { degree, sky: columns.has('visibility'), lamps: columns.get('lamps')?.width ?? 0, emission };
+    const [seen, diffuse] = [columns.has('visibility'), columns.has('diffuse')];
+    const shape = { degree, sky: seen, lamps: columns.get('lamps')?.width ?? 0, emission, diffuse };
     if (shape.sky && !sky) throw new Error('The progressive mesh sees a sky that the scene has not.');
     if (shape.lamps !== lamps.length) throw new Error('The progressive mesh sees other lamps than the scene has.');
-    const empty = emptyTexels(shape, all, this.mesh.largest('coefficients'));
+    if (diffuse && !lobes) throw new Error('The progressive mesh has diffuse light that the scene has not.');
+    const largest = Math.max(this.mesh.largest('coefficients'), diffuse ? this.mesh.largest('diffuse') : 0);
+    const empty = emptyTexels(shape, all, largest);
     ({ texture: this.texture, texels: this.texels } = fieldTexture(empty, stage.renderer.capabilities.maxTextureSize));
     this.write = texelWriter(this.texels);
     for (let v = 0; v < all; ++v) this.writeTexels(v);
     this.mesh.touched.clear();
-    this.parts = model.parts.map((part, i) => this.makePart(part, { sky, lamps }, i));
+    this.parts = model.parts.map((part, i) => this.makePart(part, { sky, lamps, lobes }, i));
     for (const { mesh } of this.parts) this.group.add(mesh);
     this.group.matrixAutoUpdate = false;
     this.group.matrix.copy(model.parts[0].mesh.matrixWorld); // one node has all parts
@@ -134,10 +138,11 @@ class ProgressiveShape {
   }
 
   private writeTexels(vertex: number): void {
-    const { series, visibility, lamps } = this.write;
-    for (const [name, into] of [['coefficients', series], ['visibility', visibility], ['lamps', lamps]] as const) {
+    const { series, visibility, lamps, diffuse } = this.write;
+    const into = { coefficients: series, visibility, lamps, diffuse };
+    for (const [name, write] of Object.entries(into)) {
       const column = this.mesh.columns.get(name);
-      if (column) into(vertex, column.values, column.width * vertex);
+      if (column) write(vertex, column.values, column.width * vertex);
     }
   }
 
@@ -163,7 +168,7 @@ class ProgressiveShape {
     }
   }
 
-  private makePart(look: BakedPart, { sky, lamps }: Apart, index: number): Part {
+  private makePart(look: BakedPart, { sky, lamps, lobes }: Apart, index: number): Part {
     const { unlit, albedo, finish, glow, emission, geometry: own } = look;
     const { part, triangles, columns } = this.mesh;
     const most = part.length > 0 ? part.reduce((sum, one) => sum + Number(one === index), 0) : triangles.length / 3;
@@ -181,7 +186,7 @@ class ProgressiveShape {
     geometry.setAttribute('corners', new BufferAttribute(corners, 3));
     const vertexAlbedo = geometry.hasAttribute('_albedo');
     const { unit } = this.texels;
-    const dress = { unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo };
+    const dress = { unlit, albedo, finish, glow, emission, sky, lamps, lobes, vertexAlbedo };
     const surface = { shape: this.texels, unit, texture: this.texture, ...dress };
     const materials = [fieldMaterial(surface, false), fieldMaterial(surface, true)] as const;
     const mesh = new Mesh(geometry, materials[0]);

@@ -2,8 +2,8 @@
 // are. The geometry has three vertices of its own for each triangle (main/field_look.ts): a fragment must know its
 // corners, and WebGL 2 does not tell. Harmonics are evaluated once, whatever the number of corners. Albedo, textures and
 // emission are in the field; of the textures only the opacity counts. Where the field keeps the sky apart (sky_code.ts) or
-// lamps (lamp_code.ts), base colour and finish say how a fragment mirrors them; where it keeps emission apart, that is the
-// fragment's.
+// lamps (lamp_code.ts), base colour and finish say how a fragment mirrors them; where it keeps diffuse light apart, the
+// fragment's colour multiplies it; where it keeps emission apart, that is the fragment's.
 //
 // With PER_VERTEX the field is evaluated at the vertices and colours are interpolated (figure 6 of the paper): several
 // times faster, and highlights break at edges.
@@ -21,6 +21,7 @@ import {
 import {
   type FieldShape,
   type FieldTexels,
+  diffuseHalfAt,
   fieldCount,
   halfAt,
   kLeastSeen,
@@ -33,6 +34,7 @@ import { kVisibilityCount } from '../asset/mirrored_sky';
 import { type Finish, type Glow, sides, transformOf, uvOf } from './baked_material';
 import { harmonicsCode } from './harmonics_code';
 import { lampFunctions, lampUniforms } from './lamp_code';
+import { lobeFunctions } from './mirror';
 import { skyFunctions } from './sky_code';
 
 /// r-RFs as a texture, and the same r-RFs in its own memory, so that nobody need keep the first ones. No vertex is split
@@ -54,8 +56,7 @@ export function fieldTexture(field: FieldTexels, most: number): { texture: DataT
   return { texture, texels: { ...field, halves: own } };
 }
 
-/// radianceSeen(corners, weights, place, n, v, mirror): the place is of the unit cube, n and v are unit, v towards the eye;
-/// mirror is F0 and roughness.
+/// radianceSeen(corners, weights, place, n, v, surface): the place is of the unit cube, n and v are unit, v towards the eye.
 function fieldFunctions(shape: FieldShape): string {
   const { degree } = shape;
   const products: string[][] = Array.from({ length: texelsOf(shape) }, (_, texel) => [
@@ -70,6 +71,7 @@ function fieldFunctions(shape: FieldShape): string {
     put(halfAt(degree, 0, c), (one) => `least.${'rgb'[c]} = ${one};`);
   for (let i = 0; shape.sky && i < kVisibilityCount; ++i)
     put(skyHalfAt(degree, i), (one) => `visibility[${i}] = ${one};`);
+  for (let c = 0; shape.diffuse && c < 3; ++c) put(diffuseHalfAt(shape, c), (one) => `diffuse.${'rgb'[c]} = ${one};`);
   for (let k = 0; k < shape.lamps; ++k) put(lampHalfAt(shape, k), (one) => `lamps[${k}] = ${one};`);
   return /* glsl */ `
 uniform highp usampler2D field;
@@ -85,9 +87,10 @@ void fetchEight(ivec2 a, ivec2 b, ivec2 c, vec3 weights, int texel, out vec4 low
   low = weights.x * four(p.xy) + weights.y * four(q.xy) + weights.z * four(r.xy);
   high = weights.x * four(p.zw) + weights.y * four(q.zw) + weights.z * four(r.zw);
 }
+${shape.sky || shape.diffuse ? `#define LOBE_TEXELS 1\n${lobeFunctions}` : ''}
 ${shape.sky ? skyFunctions : ''}
 ${shape.lamps > 0 ? lampFunctions(shape.lamps) : ''}
-vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, vec4 mirror) {
+vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, Surface surface) {
   float above = dot(n, v);
   vec3 raised = v - min(above, 0.0) * n;
   float size = length(raised);
@@ -96,17 +99,25 @@ vec3 radianceSeen(ivec3 corners, vec3 weights, vec3 place, vec3 n, vec3 v, vec4 
   float x = r.x, y = r.y, z = r.z;
   ${harmonicsCode(degree)}
   ivec2 a = placeOf(corners.x), b = placeOf(corners.y), c = placeOf(corners.z);
-  vec3 sum = vec3(0.0), least = vec3(0.0);
+  vec3 sum = vec3(0.0), least = vec3(0.0), diffuse = vec3(0.0);
   vec4 low, high;
   ${shape.sky ? `float visibility[${kVisibilityCount}];` : ''}
   ${shape.lamps > 0 ? `float lamps[${shape.lamps}];` : ''}
   ${products.flat().join('\n  ')}
+  ${shape.diffuse ? sentCode(shape.sky) : ''}
   sum *= fieldUnit;
-  ${shape.sky ? 'sum += mirroredSky(n, seen, mirror.rgb, mirror.a, visibility);' : ''}
-  ${shape.lamps > 0 ? 'sum += lampHighlights(place, n, seen, mirror.rgb, mirror.a, lamps);' : ''}
+  ${shape.sky ? 'sum += mirroredSky(n, seen, surface.f0, surface.roughness, visibility);' : ''}
+  ${shape.lamps > 0 ? 'sum += lampHighlights(place, n, seen, surface.f0, surface.roughness, lamps);' : ''}
   return max(sum, max(vec3(0.0), fieldUnit * ${kLeastSeen} * y0 * least));
 }`;
 }
+
+/// Diffuse light that is kept apart goes through the specular layer and takes on the colour of the place.
+const sentCode = (sky: boolean): string => /* glsl */ `
+  vec2 kept = lobeAt(max(0.0, dot(n, seen)), surface.roughness, 0).xy;
+  vec3 sent = surface.diffuse * diffuse * (1.0 - 0.04 * kept.x - kept.y);
+  sum += sent;
+  ${sky ? 'least += sent / y0;' : ''}`;
 
 // What is interpolated is taken inside the triangle: beside it weights would be negative.
 const varyings = /* glsl */ `
@@ -135,6 +146,11 @@ varying vec2 vEmissionUv;
 
 // Both shaders: base colour and opacity, and what of them mirrors.
 const surfaceFunctions = /* glsl */ `
+struct Surface {
+  vec3 f0;
+  vec3 diffuse; // (1 - metallic) base colour
+  float roughness;
+};
 uniform vec4 albedo;
 #ifdef ALBEDO_MAP
 uniform sampler2D albedoMap;
@@ -154,12 +170,12 @@ vec4 baseHere() {
 #endif
   return base;
 }
-vec4 mirrorOf(vec3 base) {
+Surface surfaceOf(vec3 base) {
   vec2 finish = vec2(roughness, metallic);
 #ifdef FINISH_MAP
   finish *= textureHere(finishMap, vFinishUv).gb;
 #endif
-  return vec4(mix(vec3(0.04), base, finish.y), finish.x);
+  return Surface(mix(vec3(0.04), base, finish.y), base * (1.0 - finish.y), finish.x);
 }`;
 
 const vertexShader = (functions: string) => /* glsl */ `
@@ -203,7 +219,7 @@ void main() {
 #endif
 #ifdef PER_VERTEX
   ivec3 here = ivec3(int(corners[own]));
-  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), position, normalize(n), normalize(toEye), mirrorOf(baseHere().rgb));
+  vSeen = radianceSeen(here, vec3(1.0, 0.0, 0.0), position, normalize(n), normalize(toEye), surfaceOf(baseHere().rgb));
 #else
   vCorners = ivec3(corners);
   vWeights = vec3(own == 0, own == 1, own == 2);
@@ -234,7 +250,7 @@ void main() {
 #ifdef PER_VERTEX
   vec3 seen = vSeen;
 #else
-  vec3 seen = radianceSeen(vCorners, vWeights, vPlace, normalize(vNormal), normalize(vToEye), mirrorOf(base.rgb));
+  vec3 seen = radianceSeen(vCorners, vWeights, vPlace, normalize(vNormal), normalize(vToEye), surfaceOf(base.rgb));
 #endif
   vec3 emitted = emission;
 #ifdef EMISSION_MAP
@@ -246,11 +262,10 @@ void main() {
   #include <dithering_fragment>
 }`;
 
-/// The sky of a light field, and the table of lobes (mirror.ts).
+/// The sky of a light field.
 export interface SkyLook {
   texture: DataArrayTexture;
   unit: number;
-  lobes: Texture;
 }
 
 export interface FieldSurface {
@@ -264,16 +279,17 @@ export interface FieldSurface {
   emission: readonly number[]; // without glow
   sky: SkyLook | null;
   lamps: readonly FieldLamp[];
+  lobes: Texture | null; // the table (mirror.ts), where the sky or diffuse light is apart
   vertexAlbedo: boolean; // the geometry has `_albedo`
 }
 
 /// Owns only itself; the textures belong to others.
 export function fieldMaterial(surface: FieldSurface, perVertex: boolean): ShaderMaterial {
-  const { shape, texture, unit, unlit, albedo, finish, glow, emission, sky, lamps, vertexAlbedo } = surface;
-  const mirrors = sky !== null || lamps.length > 0;
+  const { shape, texture, unit, unlit, albedo, finish, glow, emission, sky, lamps, lobes, vertexAlbedo } = surface;
+  const coloured = shape.sky || shape.lamps > 0 || shape.diffuse;
   const defines: Record<string, string> = {};
-  const map = mirrors || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
-  const finishMap = mirrors ? (finish?.map ?? null) : null;
+  const map = coloured || unlit.transparent || unlit.alphaTest > 0 ? unlit.map : null;
+  const finishMap = coloured ? (finish?.map ?? null) : null;
   const emissionMap = shape.emission ? (glow?.map ?? null) : null;
   const emitted = !shape.emission ? new Color(0) : (glow?.factor ?? new Color().setRGB(emission[0], emission[1], emission[2]));
   if (perVertex) defines.PER_VERTEX = '';
@@ -295,7 +311,7 @@ export function fieldMaterial(surface: FieldSurface, perVertex: boolean): Shader
       fieldUnit: { value: unit },
       sky: { value: sky?.texture ?? null },
       skyUnit: { value: sky?.unit ?? 1 },
-      lobes: { value: sky?.lobes ?? null },
+      lobes: { value: lobes },
       ...lampUniforms(lamps.slice(0, shape.lamps)),
       albedo: { value: [r, g, b, unlit.opacity] },
       alphaCutoff: { value: unlit.alphaTest },

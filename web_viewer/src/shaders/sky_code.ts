@@ -3,7 +3,6 @@
 import { ClampToEdgeWrapping, DataArrayTexture, DataUtils, HalfFloatType, LinearFilter, RepeatWrapping } from 'three';
 import { kFacets, kLeastAlpha, kNarrowest, kVisibilityCount, kVisibilityOrder, type MirroredSky } from '../asset/mirrored_sky';
 import { harmonicsCode } from './harmonics_code';
-import { lobeFunctions } from './mirror';
 
 /// All levels, one layer each; colours without the sky's unit.
 export function skyTexture(sky: MirroredSky): DataArrayTexture {
@@ -18,12 +17,10 @@ export function skyTexture(sky: MirroredSky): DataArrayTexture {
 
 const terms = Array.from({ length: kVisibilityCount }, (_, i) => `visibility[${i}] * y${i}`);
 
-/// mirroredSky(n, v, f0, roughness, visibility): all unit, v not below the horizon of n.
+/// mirroredSky(n, v, f0, roughness, visibility): all unit, v not below the horizon of n. Needs lobeAt (mirror.ts).
 export const skyFunctions = /* glsl */ `
 uniform highp sampler2DArray sky;
 uniform float skyUnit;
-#define LOBE_TEXELS 1
-${lobeFunctions}
 float visibleShare(vec3 w, float visibility[${kVisibilityCount}]) {
   float x = w.x, y = w.y, z = w.z;
   ${harmonicsCode(kVisibilityOrder - 1)}
