@@ -165,7 +165,8 @@ TEST_P(Progressive, DiffuseLightComesBackBesideLamps) {
 TEST(ProgressiveMesh, MoreLampsThanThereMayBeAreAFault) {
   auto bytes = encode_progressive(progressive_mesh(recorded(sample(4), Collapse::edge, 10).record));
   // Of the attributes bits 6 and 9: nine lamps; bit 11: nobody knows.
-  for (const auto& [byte, bits] : {std::pair{8, 64}, {9, 2 + 8}}) bytes[static_cast<std::size_t>(byte)] |= bits;
+  bytes[8] |= 64;
+  bytes[9] |= 2 + 8;
   const auto out = decode_progressive(bytes);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, "unsupported_version");
