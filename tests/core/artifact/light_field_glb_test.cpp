@@ -199,8 +199,10 @@ BakedScene with_diffuse() {
   BakedScene out = with_field(2);
   out.transfer = {0, 3, true, {}};
   Random random(17, 0);
-  for (std::size_t i = 0; i < 3 * out.scene.mesh.position.size(); ++i)
-    out.transfer.coefficients.push_back(2 * random.uniform());
+  // Red numbers the vertices, as original_vertices() asks.
+  for (std::size_t v = 0; v < out.scene.mesh.position.size(); ++v)
+    for (std::size_t c = 0; c < 3; ++c)
+      out.transfer.coefficients.push_back(c == 0 ? static_cast<float>(v) : 2 * random.uniform());
   out.light.coefficients.clear();
   out.field.diffuse = out.transfer.coefficients;
   out.field.diffuse_color = {0.5F, 0.25F, 0.75F};
@@ -212,8 +214,8 @@ TEST(LightFieldGlb, DiffuseLightThatIsKeptApartIsTheTransfer) {
   EXPECT_EQ(read.field.diffuse_color, written.field.diffuse_color);
   EXPECT_EQ(read.field.diffuse, read.transfer.coefficients);
   const double worst = worst_of(read.field.diffuse, written.field.diffuse, original_vertices(read));
-  EXPECT_LE(worst, 1.001 / 4095);  // twelve bits over a range of at most 2: half a step
-  EXPECT_GT(worst, 0.2 / 4095);
+  // Half a step of at least twelve bits over the range of red.
+  EXPECT_LE(worst, 1.001 * static_cast<double>(written.scene.mesh.position.size()) / 2 / 4095);
   EXPECT_FALSE(round_trip(with_field(2)).field.has_diffuse());
 }
 

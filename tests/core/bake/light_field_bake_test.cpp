@@ -252,8 +252,8 @@ TEST(LightFieldDiffuse, UnderTexturesIsApartAndAsSharpAsTheyAre) {
   const auto seen = [&](double u) { return FieldEye(scene, field, {}).seen({0, u, 0, 0}, {0, 0, 1}, {0, 0, 1}); };
   const Vec3d before = seen(0.45);
   field.diffuse = {1, 2, 3, 1, 2, 3, 1, 2, 3};
-  const Vec4f& color = scene.materials[0].base_color;
-  const Vec3d base{color.x, color.y, color.z};
+  scene.materials[0].base_color = {0.5F, 0.25F, 0.75F, 1};
+  const Vec3d base{0.5, 0.25, 0.75};
   const double left = 1 - lobe_at(albedo_table(), 1, double{scene.materials[0].roughness}).kept();
   EXPECT_NEAR(length(seen(0.45) - before - base * Vec3d{1, 2, 3} * left), 0, 1e-6);  // floats of materials
   EXPECT_NEAR(length(seen(0.55) - before), 0, 1e-6);
