@@ -1,4 +1,4 @@
-// kiln plan IN: what a bake would model and what it would skip, and why; nothing is baked.
+// kiln plan IN: what a bake would model and what it would skip, and why.
 #include <filesystem>
 
 #include "client_cli/commands.h"
