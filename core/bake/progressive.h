@@ -57,6 +57,7 @@ class Passes {
 
  private:
   std::optional<Plan> end(Outlook::Ending, std::string reason);
+  double transport_target() const;
   bool transport_met() const;
   bool own_light_bound() const;  // the target bounds the job's own light too: no order was asked for
   bool stuck() const;
@@ -66,7 +67,7 @@ class Passes {
   Growth wanted(double most) const;
   Growth least_growth() const;
   bool idle(const Growth&) const;
-  bool more_bands_help() const;
+  bool no_order_suffices() const;
   bool bands_missing(const Plan& last) const;
   bool simplified_too_far(const Plan& last) const;
   std::optional<Plan> higher_order(const Plan& last, const Scene&);
