@@ -204,11 +204,12 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
   const bool to_vertices = !input.recipe.radiosity || input.recipe.radiosity->deliver.vertices;
   if (input.recipe.certificate && !carried && to_vertices) {
     const Tracer truth(scene, threads);
-    pass.certificate = certify(decoded, truth, light,
-                               {.bake_rays = log.rays() - rays_before,
-                                .thorough = input.recipe.promise && (!plan.radiosity || input.recipe.radiosity),
-                                .seed = input.recipe.seed},
-                               threads);
+    pass.certificate =
+        certify(decoded, truth, light,
+                {.bake_rays = log.rays() - rays_before,
+                 .thorough = input.recipe.promise.target_error && (!plan.radiosity || input.recipe.radiosity),
+                 .seed = input.recipe.seed},
+                threads);
     if (!plan.radiosity || input.recipe.radiosity) {
       const double merging = pass.merge ? pass.merge->error : 0;
       pass.sources = split_error(*pass.certificate, decoded, {noise, storage, tail_left, merging, points_squared});
