@@ -128,9 +128,7 @@ FieldCertificate certify_field(const FieldCheck& check, Threads& threads) {
   const auto start = std::chrono::steady_clock::now();
   const std::uint64_t seed = mix64(check.seed ^ 0x6669656c64ULL), paths = mix64(check.seed ^ 0x65796573ULL);
   const Judge judge(check, threads);
-  const Environment* sky = check.environment ? &*check.environment : nullptr;
-  const std::vector<FieldView> views =
-      many_views(check.decoded, check.truth.scene(), sky, {.count = kViews, .seed = seed}, threads);
+  const std::vector<FieldView> views = even_views(check.decoded, check.truth.scene().mesh, kViews, seed, threads);
 
   const Eyes few = judge.open(choose_views(views, Spending::kFewestPoints, seed));
   const Truth first = judge.trace(few, Spending::kPilotSamples, mix64(paths));

@@ -87,38 +87,6 @@ TEST(LightFieldCertificate, CountsDarkErrorsByTheirArea) {
   EXPECT_GE(e.interval_high, error);
 }
 
-/// A sky that is dark but for one texel of 128 x 64, a lamp.
-Environment one_lamp() {
-  Environment out{.name = {}, .width = 128, .height = 64, .radiance = {}};
-  out.radiance.assign(128 * 64, {0.001F, 0.001F, 0.001F});
-  out.radiance[20 * 128 + 37] = {1000, 1000, 1000};
-  return out;
-}
-
-/// Of the sky in the mirror: the mean over even eyes is its integral over the half space above, and a lamp of a
-/// thirteen-thousandth of that is in no more than two or three of 20,000 even eyes.
-TEST(FieldViews, FindALampOfOneTexelInTheMirror) {
-  Threads threads;
-  const BakedScene floor = glowing_floor();
-  const Environment sky = one_lamp();
-  const double texel =
-      2 * std::numbers::pi / 128 * (std::cos(std::numbers::pi * 20 / 64) - std::cos(std::numbers::pi * 21 / 64));
-  const double truth = 1000 * texel / (2 * std::numbers::pi) + 0.001;
-  const auto found = [&](const Environment* known) {
-    double sum = 0, all = 0;
-    for (const FieldView& v : many_views(floor, floor.scene, known, {.count = 20'000, .seed = 5}, threads)) {
-      const Vec3d l{-v.view.x, v.view.y, -v.view.z};
-      // Within half a texel of its borders maps are interpolated: as the sampler has it, a texel is even.
-      const double u = 0.5 + std::atan2(l.z, l.x) / (2 * std::numbers::pi), row = std::acos(l.y) / std::numbers::pi;
-      const bool lit = std::floor(128 * u) == 37 && std::floor(64 * row) == 20;
-      sum += v.weight * (lit ? 1000 : 0.001), all += v.weight;
-    }
-    return sum / all;
-  };
-  EXPECT_NEAR(found(&sky), truth, 0.05 * truth);  // 2 % was measured
-  EXPECT_GT(std::abs(found(nullptr) - truth), 0.2 * truth);
-}
-
 TEST(FieldViews, ChosenOnesStandForAllInTheMean) {
   std::vector<FieldView> all(5000);
   double sum = 0;
