@@ -218,6 +218,26 @@ class LightSource {
   float scale_ = 1;
 };
 
+/// What subdivision asks for first: vertices, and middles of what is wider than points are apart. Where these see no
+/// point one is placed, which is cheaper than that each gathers for itself.
+std::vector<TransferPoint> first_places(const Mesh& mesh, float apart) {
+  std::vector<TransferPoint> out = vertex_points(mesh);
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3f middle = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F;
+    bool wide = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      if (length(mesh.position[b] - mesh.position[a]) < apart) continue;
+      out.push_back(edge_point(mesh, t, std::min(a, b), std::max(a, b), 0.5F));
+      wide = true;
+    }
+    if (!wide) continue;
+    const Vec3f face = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
+    out.push_back({middle, normalized(mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]], face), middle, face});
+  }
+  return out;
+}
+
 struct Refined {
   const Tracer& tracer;  // of the input
   const Environment* sky;
@@ -358,7 +378,8 @@ SolvedRadiosity solve_radiosity_step(Scene& scene, Plan& plan, const Environment
   const Tracer tracer(scene, threads);  // of the input: scene.mesh changes last
 
   log.begin("reflected", plan.grid ? 0.25 : 0.45);
-  std::vector<TransferPoint> readers = vertex_points(scene.mesh);
+  std::vector<TransferPoint> readers =
+      first_places(scene.mesh, std::ldexp(params.points.radius, 1 - params.points.levels));
   readers.insert(readers.end(), hooks.places.begin(), hooks.places.end());
   ReflectedLight reflected(tracer, sky, params, readers, threads);
   log.count_rays(reflected.stats().direct_rays + reflected.stats().gather_rays);

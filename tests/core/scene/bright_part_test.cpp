@@ -37,7 +37,9 @@ TEST(BrightPart, LeavesAtMostSoManyTimesTheMeanOfTheRest) {
     const Vec3f rest = map.radiance[i] - bright.radiance[i];
     // 2 lamps of 2048 texels leave a mean of at most (1 + 2 * 1.6 * kBright * mean / 2048): 1.02
     EXPECT_LE((rest.x + rest.y + rest.z) / 3, 1.03F * static_cast<float>(kBright)) << i;
-    if (i != 700 && i != 1500) EXPECT_EQ(bright.radiance[i], Vec3f{});
+    if (i != 700 && i != 1500) {
+      EXPECT_EQ(bright.radiance[i], Vec3f{});
+    }
   }
   EXPECT_NEAR(bright.radiance[1500].z / bright.radiance[1500].x, 3, 1e-5);  // of the texel's colour
 }
