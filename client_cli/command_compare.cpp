@@ -35,19 +35,21 @@ Outcome<Side> load_side(const std::string& path) {
 }
 
 /// The light under which artefacts are compared: --env, or what A was baked with.
-std::vector<Vec3f> common_light(const BakedScene& baked, const BakedScene& first,
-                                const std::optional<Environment>& environment) {
+BakedLight common_light(const BakedScene& baked, const BakedScene& first,
+                        const std::optional<Environment>& environment) {
   if (baked.transfer.order == 0) return {};  // radiosity has its own light
-  if (environment) return project_environment(*environment, baked.transfer.order);
-  std::vector<Vec3f> light = first.light.coefficients;  // bands are independent: fewer or more of them
-  if (!light.empty()) light.resize(static_cast<std::size_t>(sh_count(baked.transfer.order)));
+  if (environment) return baked_light(*environment, baked.transfer.order);
+  BakedLight light = first.light;  // bands are independent: fewer or more of them
+  for (std::vector<Vec3f>* part : {&light.coefficients, &light.bright}) {
+    if (!part->empty()) part->resize(static_cast<std::size_t>(sh_count(baked.transfer.order)));
+  }
   return light;
 }
 
-ValueTable values_at(const BakedScene& baked, const std::vector<QueryPoint>& points, const std::vector<Vec3f>& light,
+ValueTable values_at(const BakedScene& baked, const std::vector<QueryPoint>& points, const BakedLight& light,
                      bool scene_albedo, Threads& threads) {
   const Places places = place_points(baked.scene, points, threads);
-  return {points, artefact_values(baked, places, light, {scene_albedo, points}), false};
+  return {points, artefact_values(baked, places, light.parts(), {scene_albedo, points}), false};
 }
 
 /// Both sides as tables over the same points: those of a table if there is one, else points drawn on A.

@@ -66,23 +66,23 @@ Outcome<ExitCode> run(const EvalOptions& options, Session& session) {
     return fail(ExitCode::usage, "not_relightable", "holds the light of one job (radiosity): leave out --env",
                 options.file);
   }
-  std::vector<Vec3f> light =
-      environment ? project_environment(*environment, baked.transfer.order) : baked.light.coefficients;
+  BakedLight light = environment ? baked_light(*environment, baked.transfer.order) : baked.light;
   if (options.sh_order > 0) {
     const auto kept = static_cast<std::size_t>(sh_count(options.sh_order));
-    for (std::size_t i = kept; i < light.size(); ++i) light[i] = {};
+    for (std::size_t i = kept; i < light.coefficients.size(); ++i) light.coefficients[i] = {};
+    for (std::size_t i = kept; i < light.bright.size(); ++i) light.bright[i] = {};
   }
   if (!environment) {
-    say(baked.transfer.order == 0 ? "the light of its job (radiosity)"
-        : light.empty()           ? "the artefact's own lamps"
-                                  : "the light it was baked with: " + baked.light.name);
+    say(baked.transfer.order == 0    ? "the light of its job (radiosity)"
+        : light.coefficients.empty() ? "the artefact's own lamps"
+                                     : "the light it was baked with: " + baked.light.name);
   }
   const Outcome<void> chosen = choose_lightmap(options, bytes, baked);
   if (!chosen) return tl::make_unexpected(chosen.error());
   Threads threads;
   const StopTogether together(session.interrupt, threads);
   const Places places = place_points(baked.scene, points, threads);
-  ValueTable table{points, artefact_values(baked, places, light, {options.scene_albedo, points}), false};
+  ValueTable table{points, artefact_values(baked, places, light.parts(), {options.scene_albedo, points}), false};
   return write_values(table, baked.scene.frame.scale, options.output, session);
 }
 

@@ -41,11 +41,10 @@ LightValue light_value(const Scene& scene, const SurfaceMatch& place, const Vec3
 }
 
 /// What an artefact shows at a place: its lightmap, where it has one there, or its vertices.
-Vec3f shown_at(const BakedScene& baked, const TrianglePoint& point, std::uint32_t triangle,
-               std::span<const Vec3f> light) {
+Vec3f shown_at(const BakedScene& baked, const TrianglePoint& point, std::uint32_t triangle, const LightParts& light) {
   const Mesh& mesh = baked.scene.mesh;
   if (baked.lightmap.side == 0 || baked.lightmap.parts[mesh.part[triangle]] == 0)
-    return value_at(baked.transfer, point, light);
+    return shown_at(baked.transfer, point, light);
   const auto& [a, b, c] = point.triangle;
   return baked.lightmap.at(mesh.uv1[a] * (1 - point.u - point.v) + mesh.uv1[b] * point.u + mesh.uv1[c] * point.v);
 }
@@ -169,10 +168,10 @@ Places place_points(const Scene& scene, std::span<const QueryPoint> points, Thre
   return places;
 }
 
-std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& places, std::span<const Vec3f> light,
+std::vector<LightValue> artefact_values(const BakedScene& baked, const Places& places, const LightParts& light,
                                         const LookupOptions& options) {
   std::vector<LightValue> out;
-  const EyeLight seen = eye_light(baked, {light.begin(), light.end()}, true);
+  const EyeLight seen = eye_light(baked, light);
   const FieldEye field(baked);
   for (const auto& place : places) {
     if (!place) {

@@ -35,7 +35,7 @@ struct LookupOptions {
 
 /// Values under the distant light `light` (SH of the artefact's order, or empty) and the scene's own lamps; where the
 /// scene has a lightmap, those of that.
-std::vector<LightValue> artefact_values(const BakedScene&, const Places&, std::span<const Vec3f> light,
+std::vector<LightValue> artefact_values(const BakedScene&, const Places&, const LightParts& light,
                                         const LookupOptions&);
 
 /// What a grid says of receivers in space: no surface is asked for, albedo is 1, distance 0. A zero normal has no

@@ -282,9 +282,9 @@ void read_glossy(const json& root, const Fields& extension, BakedHeader& out, Fi
   out.glossy = std::move(shape);
 }
 
-BakedLight read_light(const json& root, const Fields& extension, int order, Findings& findings) {
-  BakedLight out{extension.object("light").text("name"), {}};
-  const std::string place = std::string(kPlace) + "/light/coefficients";
+/// A colour for each coefficient of the order, or none at all.
+std::vector<Vec3f> read_colors(const json& root, const std::string& place, int order, Findings& findings) {
+  std::vector<Vec3f> out;
   const json& list = at(root, place);
   if (!list.is_array() || list.empty()) return out;
   if (list.size() != static_cast<std::size_t>(sh_count(order))) {
@@ -293,9 +293,16 @@ BakedLight read_light(const json& root, const Fields& extension, int order, Find
   }
   for (std::size_t i = 0; i < list.size() && !findings.failed(); ++i) {
     const auto c = numbers(list[i], place + "/" + std::to_string(i), 3, findings);
-    out.coefficients.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])});
+    out.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])});
   }
   return out;
+}
+
+BakedLight read_light(const json& root, const Fields& extension, int order, Findings& findings) {
+  const std::string place = std::string(kPlace) + "/light/";
+  return {.name = extension.object("light").text("name"),
+          .coefficients = read_colors(root, place + "coefficients", order, findings),
+          .bright = read_colors(root, place + "bright", order, findings)};
 }
 
 float read_exposure(const Fields& extension, Findings& findings) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/artifact/evaluate.h"
 #include "core/artifact/import.h"
 #include "core/artifact/lightmap_file.h"
 #include "core/base/result.h"
@@ -14,6 +15,7 @@
 #include "core/prt/glossy_transfer.h"
 #include "core/prt/lobe_table.h"
 #include "core/prt/transfer.h"
+#include "core/scene/environment.h"
 #include "core/scene/scene.h"
 
 namespace kiln {
@@ -21,8 +23,14 @@ namespace kiln {
 /// The light a bake was asked for: what stock viewers see, and what `eval` without --env uses.
 struct BakedLight {
   std::string name;
-  std::vector<Vec3f> coefficients;  // sh_count(order) RGB; empty when no environment was given
+  std::vector<Vec3f> coefficients = {};  // sh_count(order) RGB; empty when no environment was given
+  std::vector<Vec3f> bright = {};  // as many: of these the part of bright_part.h; empty where nothing is so bright
+
+  LightParts parts() const { return {coefficients, bright}; }
 };
+
+/// An environment as a bake of this order has it.
+BakedLight baked_light(const Environment&, int order);
 
 struct BakedScene {
   Scene scene;            // final geometry and the original materials, textures and lights

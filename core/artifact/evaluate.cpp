@@ -1,5 +1,7 @@
 #include "core/artifact/evaluate.h"
 
+#include <algorithm>
+
 #include "core/base/expects.h"
 
 namespace kiln {
@@ -39,6 +41,25 @@ std::vector<Vec3f> values_of(const Transfer& transfer, std::span<const Vec3f> li
   std::vector<Vec3f> out(transfer.vertices());
   for (std::size_t v = 0; v < out.size(); ++v) out[v] = value_at(transfer, v, light);
   return out;
+}
+
+Vec3f shown_at(const Transfer& transfer, std::size_t vertex, const LightParts& light) {
+  const Vec3f all = value_at(transfer, vertex, light.all);
+  if (light.bright.empty()) return all;
+  const Vec3f bright = add_light(transfer, vertex, light.bright, {});
+  Vec3f out;
+  for (std::size_t c = 0; c < 3; ++c) out[c] = std::max(0.0F, all[c] - bright[c]) + std::max(0.0F, bright[c]);
+  return out;
+}
+
+std::vector<Vec3f> shown_values(const Transfer& transfer, const LightParts& light) {
+  std::vector<Vec3f> out(transfer.vertices());
+  for (std::size_t v = 0; v < out.size(); ++v) out[v] = shown_at(transfer, v, light);
+  return out;
+}
+
+Vec3f shown_at(const Transfer& transfer, const TrianglePoint& point, const LightParts& light) {
+  return interpolate(point, [&](std::size_t vertex) { return shown_at(transfer, vertex, light); });
 }
 
 Vec3f value_at(const Transfer& transfer, const TrianglePoint& point, std::span<const Vec3f> light) {

@@ -25,13 +25,19 @@ bool has_matrices(const GlossyTransfer& glossy, const Triangle& triangle) {
 }
 
 EyeLight eye_light(const BakedScene& baked, std::vector<Vec3f> coefficients, bool lamps) {
-  EyeLight out{std::move(coefficients), lamps, {}};
+  EyeLight out{std::move(coefficients), {}, lamps, {}};
   if (baked.glossy) out.lit = light_components(baked.glossy, out.coefficients, lamps);
   return out;
 }
 
+EyeLight eye_light(const BakedScene& baked, const LightParts& light) {
+  EyeLight out = eye_light(baked, {light.all.begin(), light.all.end()}, true);
+  out.bright.assign(light.bright.begin(), light.bright.end());
+  return out;
+}
+
 EyeRadiance eye_radiance(const BakedScene& baked, const EyeLight& light, const EyePoint& point) {
-  const Vec3d value = to_double(light.lamps ? value_at(baked.transfer, point.place, light.coefficients)
+  const Vec3d value = to_double(light.lamps ? shown_at(baked.transfer, point.place, {light.coefficients, light.bright})
                                             : distant_value_at(baked.transfer, point.place, light.coefficients));
   const EyeMaterial& material = point.material;
   if (!baked.glossy || !has_matrices(baked.glossy, point.place.triangle)) return {material.base_color * value, {}};

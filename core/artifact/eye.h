@@ -30,10 +30,13 @@ struct EyePoint {
 /// Light over a baked scene, made once for many points.
 struct EyeLight {
   std::vector<Vec3f> coefficients;  // of the transfer vectors' order, or empty
+  std::vector<Vec3f> bright;        // of these (evaluate.h); what is reflected specularly knows no parts
   bool lamps = true;
   LitComponents lit;
 };
 EyeLight eye_light(const BakedScene&, std::vector<Vec3f> coefficients, bool lamps);
+/// With the lamps, as a viewer shows it.
+EyeLight eye_light(const BakedScene&, const LightParts&);
 
 /// The two sums of equation 1, without emission. `specular` is 0 where there are no matrices.
 struct EyeRadiance {

@@ -6,6 +6,7 @@
 
 #include "core/artifact/evaluate.h"
 #include "core/mesh/topology.h"
+#include "core/scene/bright_part.h"
 
 namespace kiln {
 namespace {
@@ -77,7 +78,7 @@ PartLook part_look(const Scene& scene, const Part& part) {
 
 std::vector<Vec3f> baked_colors(const BakedScene& baked) {
   const Mesh& mesh = baked.scene.mesh;
-  std::vector<Vec3f> out = values_of(baked.transfer, baked.light.coefficients);
+  std::vector<Vec3f> out = shown_values(baked.transfer, baked.light.parts());
   const auto part_of = part_of_vertices(mesh);
   for (std::size_t v = 0; v < out.size(); ++v) {
     const Part& part = baked.scene.parts[part_of[v]];
@@ -85,6 +86,14 @@ std::vector<Vec3f> baked_colors(const BakedScene& baked) {
     const Vec3f tint = part.has_color ? Vec3f{mesh.color[v].x, mesh.color[v].y, mesh.color[v].z} : Vec3f{1, 1, 1};
     out[v] = look.albedo * tint * out[v] + look.emission;
   }
+  return out;
+}
+
+BakedLight baked_light(const Environment& sky, int order) {
+  BakedLight out{.name = sky.name, .coefficients = project_environment(sky, order)};
+  const Environment bright = bright_part(sky);
+  if (bright.width > 1 || bright.height > 1 || bright.radiance[0] != Vec3f{})
+    out.bright = project_environment(bright, order);
   return out;
 }
 

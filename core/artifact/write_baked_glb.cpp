@@ -257,12 +257,16 @@ class Writer {
 
   json transfer_extension() const {
     const Transfer& t = baked_.transfer;
-    json light = json::array();
-    for (const Vec3f& c : baked_.light.coefficients) light.push_back(vec(c));
+    const auto colors = [](const std::vector<Vec3f>& light) {
+      json list = json::array();
+      for (const Vec3f& c : light) list.push_back(vec(c));
+      return list;
+    };
     json out = {{"version", 2},     {"basis", "real-sh"},     {"condonShortley", false}, {"frame", "world, +Y up"},
                 {"order", t.order}, {"channels", t.channels}, {"fixed", t.fixed},        {"slots", t.slots()}};
     put_form(out, transfer_->form(), components_, [&](std::size_t k) { return transfer_->name(k); });
-    out["light"] = {{"name", baked_.light.name}, {"coefficients", light}};
+    out["light"] = {{"name", baked_.light.name}, {"coefficients", colors(baked_.light.coefficients)}};
+    if (!baked_.light.bright.empty()) out["light"]["bright"] = colors(baked_.light.bright);
     out["look"] = {{"exposure", baked_.exposure}, {"toneMap", kToneMapName}};
     out["units"] = "W m^-2 sr^-1";
     if (glossy_) out["glossy"] = glossy_extension();

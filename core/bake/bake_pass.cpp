@@ -63,13 +63,15 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   Result<GridOutcome> outcome;
   RadiosityHooks hooks;
   hooks.sources = input.recipe.radiosity && input.recipe.certificate;
-  hooks.lit = [&](const Tracer& tracer, const LitSurface* surface, std::span<const Vec3f> value) {
+  hooks.lit = [&](const Tracer& tracer, const LitSurface* surface, const Mesh& mesh, std::span<const Vec3f> value) {
     const GatherFaces faces(tracer.scene());
     const IncidentLight::World world{tracer, faces, surface, sky};
     if (plan.grid) outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
     if (plan.field) {
       log.begin("light field", 0.88);
-      out.outgoing = bake_light_field(world, value, plan, log, threads);
+      Scene refined = tracer.scene();
+      refined.mesh = mesh;
+      out.outgoing = bake_light_field(world, {refined, value}, plan, log, threads);
     }
   };
   std::optional<FinishSource> finish;
@@ -148,7 +150,7 @@ Result<Pass> bake_pass(const BakeInput& input, CarriedScene& in, const std::opti
     pass.grid = std::move(lit.grid);
     outgoing = std::move(lit.outgoing);
   } else {
-    if (light) own = {light->name, project_environment(*light, plan.order)};
+    if (light) own = baked_light(*light, plan.order);
     transport = solve_transport(scene, plan, band_power(plan.order, own), input.recipe.seed, log, threads);
   }
   log.begin("write", 0.9);

@@ -245,7 +245,7 @@ Samples job_light_samples(const BakedScene& baked, const Probe& probe, const Ref
   Samples out;
   std::vector<Vec3d> half_a, half_b;
   for (std::size_t i = 0; i < points; ++i) {
-    out.shown.push_back(to_double(value_at(baked.transfer, probe.delivered[i], baked.light.coefficients)));
+    out.shown.push_back(to_double(shown_at(baked.transfer, probe.delivered[i], baked.light.parts())));
     out.truth.push_back(together(reference.value, i));
     half_a.push_back(together(reference.half_a, i));
     half_b.push_back(together(reference.half_b, i));

@@ -147,7 +147,7 @@ Judged look(const BakedScene& baked, const Eyes& eyes, const ReferenceLight& lig
   if (light.scene_lights) add(all - 1, eye_light(baked, {}, true));
   if (skipped == 0 && !light.scene_lights) return out;
   // The job's environment in full is the first lighting, the lamps are the last.
-  const EyeLight own = eye_light(baked, baked.light.coefficients, true);
+  const EyeLight own = eye_light(baked, baked.light.parts());
   for (std::size_t p = 0; p < points; ++p) {
     const EyeRadiance shown = eye_radiance(baked, own, eyes.shown[p]);
     const auto together = [&](const std::vector<Vec3d>& below, const std::vector<Vec3d>& above) {

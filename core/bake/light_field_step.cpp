@@ -203,14 +203,13 @@ std::vector<float> FinishSource::values(std::span<const TransferPoint> points, T
   return out;
 }
 
-OutgoingLight bake_light_field(const IncidentLight::World& world, std::span<const Vec3f> value, const Plan& plan,
+OutgoingLight bake_light_field(const IncidentLight::World& world, const LitVertices& vertices, const Plan& plan,
                                BakeLog& log, Threads& threads) {
   OutgoingBake params = plan.field->outgoing;
   params.progress = [&](std::uint64_t done, std::uint64_t all) { log.advance(done, all); };
-  OutgoingLight out = bake_outgoing(world, value, params, threads);
+  OutgoingLight out = bake_outgoing(world, vertices, params, threads);
   log.count_rays(out.rays);
-  if (plan.field->basis == RadianceBasis::polynomials)
-    keep_polynomials(out.field, world.tracer.scene().mesh.normal, threads);
+  if (plan.field->basis == RadianceBasis::polynomials) keep_polynomials(out.field, vertices.scene.mesh.normal, threads);
   return out;
 }
 

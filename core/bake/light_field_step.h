@@ -42,8 +42,7 @@ class FinishSource {
   std::array<float, kWidth> scale_{};
 };
 
-OutgoingLight bake_light_field(const IncidentLight::World&, std::span<const Vec3f> value, const Plan&, BakeLog&,
-                               Threads&);
+OutgoingLight bake_light_field(const IncidentLight::World&, const LitVertices&, const Plan&, BakeLog&, Threads&);
 
 /// How r-RFs are stored: as weights of as few components and in as few bits as the plan's share for storage allows.
 TransferEncoding choose_field_encoding(const LightField&, const Mesh&, const Plan&);

@@ -238,8 +238,8 @@ Hit first_facing(const Tracer& tracer, Vec3f origin, const Vec3f& direction) {
 Result<Bytes> render_preview(const BakedScene& decoded, const Tracer& tracer, const Preview& preview,
                              Threads& threads) {
   const Rays rays{frame_camera(decoded.scene.mesh, preview), preview};
-  const Painter painter{decoded, tracer, values_of(decoded.transfer, decoded.light.coefficients),
-                        eye_light(decoded, decoded.light.coefficients, true),
+  const Painter painter{decoded, tracer, shown_values(decoded.transfer, decoded.light.parts()),
+                        eye_light(decoded, decoded.light.parts()),
                         FieldEye(tracer.scene(), decoded.field, decoded.sky)};
   const auto color = [&](std::size_t, const Rays::Ray& ray) {
     return painter.color(rays.camera.eye, ray.direction, ray.height);

@@ -120,6 +120,146 @@ void predict_radiosity(Plan& plan, const Scene& scene) {
                                                   4.5 * (vertices + input) + 5 * vertices);
 }
 
+/// All light at places, as subdivision sees it: in parts of its mean, so that it counts like an open sky of 1.
+class LightSource {
+ public:
+  struct Work {
+    const Tracer& tracer;
+    const Environment* sky;
+    const Plan& plan;
+    ReflectedLight& reflected;
+    const MoreLight& more;
+  };
+  /// Keeps references.
+  LightSource(const Work& work, BakeLog& log, Threads& threads)
+      : work_(work),
+        log_(log),
+        threads_(threads),
+        seed_(work.plan.radiosity->seed),
+        light_(work.tracer, work.sky, work.plan.radiosity->direct),
+        rough_(work.tracer, work.sky, work.plan.radiosity->direct.rough()),
+        hidden_(hidden_test(work.tracer)),
+        expected_(work.plan.split ? 3 * work.plan.subdivide.triangles : work.tracer.scene().mesh.position.size()) {
+    const double mean = mean_of(all_light(spread_points(work.tracer.scene().mesh), rough_));
+    if (mean > 1e-30 && mean < 1e30) scale_ = static_cast<float>(kOpenConstantBand / mean);
+  }
+
+  ValueSource source() {
+    return {.width = width(),
+            .values = [this](std::span<const TransferPoint> batch) { return columns(batch, light_); },
+            .bounded = {0, 1, 2},
+            .hidden = hidden_,
+            .rough = [this](std::span<const TransferPoint> batch) { return columns(batch, rough_); }};
+  }
+
+  /// Of rows that subdivision has found.
+  std::vector<Vec3f> light_of(std::span<const float> rows) const {
+    std::vector<Vec3f> out;
+    for (std::size_t i = 0; i < rows.size(); i += width())
+      out.push_back(Vec3f{std::max(0.0F, rows[i]), std::max(0.0F, rows[i + 1]), std::max(0.0F, rows[i + 2])} / scale_);
+    return out;
+  }
+
+ private:
+  std::size_t width() const { return 6 + work_.more.width; }
+
+  /// Light as it looks, beside light as it is: an edge in the shade counts like one in the sun, where it else would
+  /// have no triangles (walls that see a window aside had streaks as wide as they are).
+  static float as_seen(float x) {
+    constexpr float kDim = kOpenConstantBand / 4;  // a quarter of the mean
+    constexpr float kWeight = 3;  // the least at which the hotel room's walls were smooth; its error stays the same
+    return kWeight * kDim * std::log1p(std::max(0.0F, x) / kDim);
+  }
+
+  std::vector<float> columns(std::span<const TransferPoint> batch, const DirectLight& direct) {
+    const std::vector<float> more = work_.more.width > 0 ? work_.more.values(batch) : std::vector<float>{};
+    const std::vector<Vec3f> light = all_light(batch, direct);
+    std::vector<float> out;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const Vec3f x = light[i] * scale_;
+      out.insert(out.end(), {x.x, x.y, x.z, as_seen(x.x), as_seen(x.y), as_seen(x.z)});
+      for (std::size_t k = 0; k < work_.more.width; ++k)
+        out.push_back(kOpenConstantBand * more[i * work_.more.width + k]);
+    }
+    points_ += batch.size();
+    log_.advance(std::min(points_, expected_), std::max<std::uint64_t>(1, expected_));
+    return out;
+  }
+
+  /// Inside solids nothing is reflected: hidden vertices are known by their darkness.
+  std::vector<Vec3f> all_light(std::span<const TransferPoint> batch, const DirectLight& direct) {
+    constexpr std::size_t kBlock = 128;
+    std::uint64_t rays = 0;
+    std::vector<Vec3f> light = light_at(batch, direct, seed_, rays, threads_);
+    std::vector<char> hidden(batch.size());
+    threads_.for_blocks(batch.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) hidden[i] = light[i] == Vec3f{} && hidden_(batch[i]) ? 1 : 0;
+    });
+    std::vector<TransferPoint> seen;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      if (hidden[i] == 0) seen.push_back(batch[i]);
+    }
+    const std::uint64_t gathered = work_.reflected.stats().gather_rays;
+    const std::vector<Vec3f> reflected = work_.reflected.at(seen, threads_);
+    for (std::size_t i = 0, next = 0; i < batch.size(); ++i) {
+      if (hidden[i] == 0) light[i] += reflected[next++];
+    }
+    log_.count_rays(rays + work_.reflected.stats().gather_rays - gathered);
+    return light;
+  }
+
+  Work work_;
+  BakeLog& log_;
+  Threads& threads_;
+  std::uint64_t seed_;
+  DirectLight light_, rough_;
+  HiddenTest hidden_;
+  std::uint64_t expected_, points_ = 0;
+  float scale_ = 1;
+};
+
+/// What subdivision asks for first: vertices, and middles of what is wider than points are apart. Where these see no
+/// point one is placed, which is cheaper than that each gathers for itself.
+std::vector<TransferPoint> first_places(const Mesh& mesh, float apart) {
+  std::vector<TransferPoint> out = vertex_points(mesh);
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3f middle = (mesh.position[t[0]] + mesh.position[t[1]] + mesh.position[t[2]]) / 3.0F;
+    bool wide = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      if (length(mesh.position[b] - mesh.position[a]) < apart) continue;
+      out.push_back(edge_point(mesh, t, std::min(a, b), std::max(a, b), 0.5F));
+      wide = true;
+    }
+    if (!wide) continue;
+    const Vec3f face = normalized(area_vector(mesh, t), mesh.normal[t[0]]);
+    out.push_back({middle, normalized(mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]], face), middle, face});
+  }
+  return out;
+}
+
+struct Refined {
+  const Tracer& tracer;  // of the input
+  const Environment* sky;
+  const Plan& plan;
+  const Mesh& mesh;
+};
+
+/// Where errors come from (error_sources.h).
+void find_sources(const Refined& r, ReflectedLight& reflected, SolvedRadiosity& out, BakeLog& log, Threads& threads) {
+  const Radiosity& params = *r.plan.radiosity;
+  const std::vector<std::uint32_t> probes = choose_probes(r.mesh, probes_for(points_of(r.plan, r.tracer.scene())));
+  const std::uint64_t gathered = reflected.stats().gather_rays;
+  std::uint64_t rays = 0;
+  out.noise.direct =
+      draw_twice(r.mesh, probes, DirectLight(r.tracer, r.sky, params.direct), params.seed, rays, threads);
+  weigh(reflected.probe(points_at(r.mesh, probes), threads), probes, out);
+  log.count_rays(rays + reflected.stats().gather_rays - gathered);
+  if (params.bounces > 0) out.tail = reflected.stats().tail;
+  if (params.bounces == 0) out.tail = measure_bounces(r.tracer, r.plan.lamps, 1, threads).left;
+  if (params.bounces < 0) out.tail = kTail;
+}
+
 }  // namespace
 
 /// The error that each is for was measured with core/meshless on the shared references.
@@ -197,7 +337,7 @@ Plan make_radiosity_plan(const Scene& scene, const RadiosityStep& step, const Ra
          !step.deliver.vertices             ? "the light of the vertices is not delivered"
          : step.subdivide.mode == Mode::off ? "turned off by the recipe"
          : step.subdivide.triangles         ? asked
-                                    : effort.reason + std::string(" adds triangles where direct light changes"));
+                                            : effort.reason + std::string(" adds triangles where light changes"));
   const Tracer tracer(scene, threads);
   plan.costs = pilot_direct(tracer, plan, sky, threads);
   predict_radiosity(plan, scene);
@@ -233,91 +373,48 @@ void grow_radiosity(Plan& plan, const RadiosityGrowth& growth, const Scene& scen
 SolvedRadiosity solve_radiosity_step(Scene& scene, Plan& plan, const Environment* sky, const RadiosityHooks& hooks,
                                      BakeLog& log, Threads& threads) {
   Radiosity params = *plan.radiosity;
-  SolvedRadiosity out;
-  log.begin("direct", plan.grid ? 0.3 : 0.55);
-  {
-    const Tracer tracer(scene, threads);
-    const DirectLight light(tracer, sky, params.direct), rough(tracer, sky, params.direct.rough());
-    std::uint64_t rays = 0, points = 0;
-    const std::uint64_t expected =
-        std::max<std::uint64_t>(1, plan.split ? 3 * plan.subdivide.triangles : scene.mesh.position.size());
-    const double mean = mean_of(light_at(spread_points(scene.mesh), rough, params.seed, rays, threads));
-    const float scale = mean > 1e-30 && mean < 1e30 ? static_cast<float>(kOpenConstantBand / mean) : 1.0F;
-    const auto columns = [&](std::span<const TransferPoint> batch, const DirectLight& from) {
-      std::vector<float> out;
-      const std::vector<float> more = hooks.more.width > 0 ? hooks.more.values(batch) : std::vector<float>{};
-      const std::vector<Vec3f> light_there = light_at(batch, from, params.seed, rays, threads);
-      for (std::size_t i = 0; i < batch.size(); ++i) {
-        const Vec3f& x = light_there[i];
-        out.insert(out.end(), {x.x * scale, x.y * scale, x.z * scale});
-        for (std::size_t k = 0; k < hooks.more.width; ++k)
-          out.push_back(kOpenConstantBand * more[i * hooks.more.width + k]);
-      }
-      points += batch.size();
-      log.advance(std::min(points, expected), expected);
-      return out;
-    };
-    const std::size_t width = 3 + hooks.more.width;
-    const ValueSource source{.width = width,
-                             .values = [&](std::span<const TransferPoint> batch) { return columns(batch, light); },
-                             .bounded = {0, 1, 2},
-                             .hidden = hidden_test(tracer),
-                             .rough = [&](std::span<const TransferPoint> batch) { return columns(batch, rough); }};
-    const Mesh base = plan.split ? base_mesh(tracer, plan, source, params.bounces != 0, threads) : scene.mesh;
-    Subdivide split = plan.subdivide;
-    if (!plan.split) split = {.triangles = 0};
-    Subdivided fine = subdivide(base, source, split, threads);
-    params.stand_ins = std::move(fine.stand_ins);
-    params.known_direct.resize(fine.mesh.position.size());
-    for (std::size_t v = 0; v < params.known_direct.size(); ++v) {
-      const float* x = &fine.values[width * v];
-      params.known_direct[v] = Vec3f{std::max(0.0F, x[0]), std::max(0.0F, x[1]), std::max(0.0F, x[2])} / scale;
-    }
-    scene.mesh = std::move(fine.mesh);
-    if (hooks.sources) {
-      params.probes = choose_probes(scene.mesh, probes_for(points_of(plan, scene)));
-      out.noise.direct = draw_twice(scene.mesh, params.probes, light, params.seed, rays, threads);
-    }
-    log.count_rays(rays);
-  }
-
-  log.begin("bounces", plan.grid ? 0.4 : 0.85);
-  const Tracer tracer(scene, threads);
-  params.places = hooks.places;
   params.light_points = hooks.lit_points != nullptr;
-  const RadiosityResult r = solve_radiosity(tracer, sky, params, threads);
-  log.count_rays(r.stats.direct_rays + r.stats.gather_rays);
-  for (const std::uint32_t n : r.stats.gathered) out.gathered += n;
-  for (const std::uint32_t n : r.stats.points) out.points += n;
-  decide(plan, "gathered", std::to_string(out.gathered) + " of " + std::to_string(out.points) + " points",
-         "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(r.stats.alone) +
-             (params.places.empty() ? "" : " texels and") + " vertices gather for themselves; " +
-             std::to_string(r.stats.sweeps) + " sweeps");
+  SolvedRadiosity out;
+  const Tracer tracer(scene, threads);  // of the input: scene.mesh changes last
 
-  const std::size_t vertices = scene.mesh.position.size();
-  if (hooks.lit_points) hooks.lit_points(r.points, r.point_light);
+  log.begin("reflected", plan.grid ? 0.25 : 0.45);
+  std::vector<TransferPoint> readers =
+      first_places(scene.mesh, std::ldexp(params.points.radius, 1 - params.points.levels));
+  readers.insert(readers.end(), hooks.places.begin(), hooks.places.end());
+  ReflectedLight reflected(tracer, sky, params, readers, threads);
+  log.count_rays(reflected.stats().direct_rays + reflected.stats().gather_rays);
+
+  log.begin("light", plan.grid ? 0.4 : 0.85);
+  LightSource source({tracer, sky, plan, reflected, hooks.more}, log, threads);
+  const ValueSource values = source.source();
+  const Mesh base = plan.split ? base_mesh(tracer, plan, values, false, threads) : scene.mesh;
+  Subdivided fine = subdivide(base, values, plan.split ? plan.subdivide : Subdivide{.triangles = 0}, threads);
+  std::vector<Vec3f> light = source.light_of(fine.values);
+  if (hooks.sources) find_sources({tracer, sky, plan, fine.mesh}, reflected, out, log, threads);
   if (hooks.lit_places) {
-    const DirectLight light(tracer, sky, params.direct);
+    const DirectLight direct(tracer, sky, params.direct);
     std::uint64_t rays = 0;
-    hooks.lit_places(
-        {std::span(r.direct).subspan(vertices), std::span(r.indirect).subspan(vertices),
-         [&](std::span<const TransferPoint> points) { return light_at(points, light, params.seed, rays, threads); },
-         tracer});
+    const auto direct_at = [&](std::span<const TransferPoint> points) {
+      return light_at(points, direct, params.seed, rays, threads);
+    };
+    const std::vector<Vec3f> there = direct_at(hooks.places);
+    hooks.lit_places({there, reflected.at(hooks.places, threads), direct_at, tracer});
     log.count_rays(rays);
   }
-  std::vector<Vec3f> light;
-  for (std::size_t v = 0; v < vertices; ++v) light.push_back(r.direct[v] + r.indirect[v]);
-  if (hooks.lit) hooks.lit(tracer, r.surface.get(), light);
+  const RadiosityStats& stats = reflected.stats();
+  for (const std::uint32_t n : stats.gathered) out.gathered += n;
+  for (const std::uint32_t n : stats.points) out.points += n;
+  decide(plan, "gathered", std::to_string(out.gathered) + " of " + std::to_string(out.points) + " points",
+         "what coarser points predict within eps_irradiance is not gathered; " + std::to_string(stats.alone) +
+             " places that see none gather for themselves; " + std::to_string(stats.sweeps) + " sweeps");
+  if (hooks.lit_points) hooks.lit_points(reflected.points(), reflected.point_light());
+  if (hooks.lit) hooks.lit(tracer, reflected.surface(), fine.mesh, light);
 
   out.transfer = {.order = 0, .channels = 3, .fixed = true, .coefficients = {}};
   out.transfer.coefficients.reserve(3 * light.size());
   for (const Vec3f& x : light) out.transfer.coefficients.insert(out.transfer.coefficients.end(), {x.x, x.y, x.z});
-  out.gather_rays = r.stats.gather_rays;
-  if (!hooks.sources) return out;
-  if (params.bounces > 0) out.tail = r.stats.tail;
-  if (params.bounces == 0) out.tail = measure_bounces(tracer, plan.lamps, 1, threads).left;
-  if (params.bounces < 0) out.tail = kTail;
-  weigh(r.probes, params.probes, out);
+  out.gather_rays = stats.gather_rays;
+  scene.mesh = std::move(fine.mesh);
   return out;
 }
 

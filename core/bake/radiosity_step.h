@@ -1,7 +1,7 @@
 #pragma once
 // The `radiosity` step: light of one job at the vertices, all reflections (core/meshless/radiosity.h).
-// The mesh is refined where direct light changes, as for `prt`; then reflected light is solved on points.
-// Result  a Transfer of order 0 whose only slot is that light.
+// Reflected light is solved on points, which know nothing of the mesh; then the mesh is refined where all light
+// changes. Result  a Transfer of order 0 whose only slot is that light.
 
 #include <cstdint>
 #include <functional>
@@ -23,7 +23,7 @@ namespace kiln {
 /// What a bake spends where the recipe does not say.
 struct RadiosityEffort {
   const char* reason;
-  std::uint64_t triangles;  // added where direct light changes
+  std::uint64_t triangles;  // added where light changes
   float threshold;          // of a split
   DirectRays direct;
   int rays;  // of a gather
@@ -48,8 +48,9 @@ struct RadiosityGrowth {
 };
 void grow_radiosity(Plan&, const RadiosityGrowth&, const Scene&);
 
-/// Called while the solved surface stands (null where nothing is reflected), with the light of each vertex.
-using OnLit = std::function<void(const Tracer&, const LitSurface*, std::span<const Vec3f>)>;
+/// Called while the solved surface of the input (null where nothing is reflected) stands with its tracer, with the
+/// refined mesh and the light of each of its vertices.
+using OnLit = std::function<void(const Tracer&, const LitSurface*, const Mesh& refined, std::span<const Vec3f>)>;
 
 /// Other light that the mesh is refined for: `width` numbers for each place, 1 in the mean.
 struct MoreLight {

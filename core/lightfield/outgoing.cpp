@@ -201,14 +201,16 @@ struct VertexResult {
 class VertexBake {
  public:
   struct Surface {
+    const Scene& scene;
     std::span<const std::uint32_t> faces;  // of vertices
     std::span<const std::size_t> lamps;    // that are kept apart
   };
   VertexBake(const IncidentLight::World& world, const OutgoingBake& params, const Surface& surface, Threads& threads)
       : world_(world),
+        scene_(surface.scene),
         lamps_(surface.lamps),
         apart_(params.sky_apart && world.sky != nullptr),
-        fits_(params.degree, threads, roughness_of(world.tracer.scene(), surface.faces)),
+        fits_(params.degree, threads, roughness_of(scene_, surface.faces)),
         norm_(params.degree),
         gather_(world, params) {
     if (apart_) sky_level_ = project_environment(*world.sky, 1)[0] / static_cast<float>(kWhite);
@@ -219,7 +221,7 @@ class VertexBake {
   /// Writes the vertex' part of the field; its `face` says what it is made of. Adds to `rays`.
   VertexResult bake(std::uint32_t v, std::uint32_t face, const TransferPoint& point, const Vec3f& value,
                     LightField& out, std::uint64_t& rays) const {
-    const VertexMaterial material = material_at(world_.tracer.scene(), v, face);
+    const VertexMaterial material = material_at(scene_, v, face);
     const LobeFit fit = fits_.at(material.roughness);
     std::vector<Look> looks = gather_.looks(point, rays);
     const double apart = apart_ ? share_apart(material.roughness) : 0;
@@ -228,7 +230,7 @@ class VertexBake {
     result.below = material.below;
     result.mean += take_lamps(looks, material);
     for (std::size_t k = 0; k < lamps_.size(); ++k)
-      out.lamp_visibility[lamps_.size() * v + k] = share_seen(world_.tracer.scene().lights[lamps_[k]], point, rays);
+      out.lamp_visibility[lamps_.size() * v + k] = share_seen(scene_.lights[lamps_[k]], point, rays);
     SkyVisibility visibility{};
     if (apart > 0) {
       visibility = visibility_of(looks, apart);
@@ -291,6 +293,7 @@ class VertexBake {
   }
 
   const IncidentLight::World& world_;
+  const Scene& scene_;  // that sends
   std::span<const std::size_t> lamps_;
   bool apart_;
   LobeFits fits_;
@@ -388,16 +391,16 @@ Vec3f diffuse_color_of(std::span<const VertexResult> vertices) {
 
 double share_apart(double roughness) { return std::clamp((0.65 - roughness) / 0.2, 0.0, 1.0); }
 
-OutgoingLight bake_outgoing(const IncidentLight::World& world, std::span<const Vec3f> value, const OutgoingBake& params,
+OutgoingLight bake_outgoing(const IncidentLight::World& world, const LitVertices& vertices, const OutgoingBake& params,
                             Threads& threads) {
-  const Scene& scene = world.tracer.scene();
+  const auto& [scene, value] = vertices;
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
   const std::vector<TransferPoint> points = vertex_points(scene.mesh);
   std::vector<std::size_t> lamps;
   if (params.lamps_apart) lamps = brightest_lamps(scene.lights, points);
-  const VertexBake vertex(world, params, {faces, lamps}, threads);
+  const VertexBake vertex(world, params, {scene, faces, lamps}, threads);
   const std::vector<std::uint32_t> order = morton_order_of(points);
   OutgoingLight out;
   out.field.degree = params.degree;

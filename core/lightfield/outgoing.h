@@ -38,7 +38,7 @@ struct OutgoingBake {
 };
 
 struct OutgoingLight {
-  LightField field;  // of the tracer's mesh
+  LightField field;  // of the vertices
   SkyLevels sky;     // where the field keeps it apart
   double noise = 0;  // of the rays: root mean square over vertices (by area), eyes and channels, relative to the mean
   std::uint64_t rays = 0;
@@ -48,7 +48,12 @@ struct OutgoingLight {
 /// well.
 double share_apart(double roughness);
 
-/// `value` of each vertex of the world's mesh.
-OutgoingLight bake_outgoing(const IncidentLight::World&, std::span<const Vec3f> value, const OutgoingBake&, Threads&);
+/// The surface that sends: the world's, or one that was split from it, with the light of each vertex.
+struct LitVertices {
+  const Scene& scene;
+  std::span<const Vec3f> value;
+};
+
+OutgoingLight bake_outgoing(const IncidentLight::World&, const LitVertices&, const OutgoingBake&, Threads&);
 
 }  // namespace kiln

@@ -24,12 +24,10 @@ std::vector<TransferPoint> places_of(const PointHierarchy& points) {
 
 SurfaceReading::SurfaceReading(const Surface& surface, std::span<const std::uint32_t> computed, int neighbours,
                                Threads& threads)
-    : SurfaceReading(surface, read_computed(surface, computed, neighbours, threads), computed, threads) {}
-
-SurfaceReading::SurfaceReading(const Surface& surface, const Reading& reading, std::span<const std::uint32_t> computed,
-                               Threads& threads)
-    : at_points_(reading, places_of(surface.points), threads),
-      at_vertices_(reading, surface.vertices, threads),
+    : surface_(surface),
+      reading_(read_computed(surface, computed, neighbours, threads)),
+      at_points_(reading_, places_of(surface.points), threads),
+      at_vertices_(reading_, surface.vertices, threads),
       self_(surface.points.points.size()),
       nearest_(surface.vertices.size(), Senders::kNone) {
   threads.for_blocks(nearest_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -71,6 +69,16 @@ std::span<const BasisTerm> SurfaceReading::of_point(std::size_t point) const {
 std::span<const BasisTerm> SurfaceReading::of_vertex(std::size_t vertex) const {
   if (nearest_[vertex] == Senders::kNone) return at_vertices_.terms(vertex);
   return of_point(nearest_[vertex]);
+}
+
+void SurfaceReading::of_place(const TransferPoint& place, std::vector<BasisTerm>& terms) const {
+  const Reading::Seen seen = reading_.at(place);
+  for (const BasisTerm& t : seen.terms) terms.push_back({t.function, t.value / seen.sum});
+  if (!seen.terms.empty()) return;
+  const std::uint32_t nearest = surface_.senders.nearest(reader_site(surface_.tracer, place, surface_.points.cover));
+  if (nearest == Senders::kNone) return;
+  const std::span<const BasisTerm> there = of_point(nearest);
+  terms.insert(terms.end(), there.begin(), there.end());
 }
 
 std::vector<std::uint32_t> SurfaceReading::unseen() const {

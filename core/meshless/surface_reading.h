@@ -37,14 +37,17 @@ class SurfaceReading {
   /// Indices into `computed`, and weights that add up to 1; empty where nothing is seen.
   std::span<const BasisTerm> of_point(std::size_t point) const;
   std::span<const BasisTerm> of_vertex(std::size_t vertex) const;
+  /// The same of any other place, appended; nothing where it must find its light itself.
+  void of_place(const TransferPoint&, std::vector<BasisTerm>& terms) const;
 
   const std::vector<std::uint32_t>& alone() const { return alone_; }  // vertices, ascending
 
  private:
-  SurfaceReading(const Surface&, const Reading&, std::span<const std::uint32_t> computed, Threads&);
   void let_read_themselves(std::span<const std::uint32_t> computed);
   std::vector<std::uint32_t> unseen() const;  // points that read nothing
 
+  Surface surface_;
+  Reading reading_;
   Readings at_points_, at_vertices_;
   std::vector<BasisTerm> self_;         // of each point: itself among the computed ones, or no weight
   std::vector<std::uint32_t> nearest_;  // of vertices that see no computed point, or Senders::kNone

@@ -195,9 +195,9 @@ class Solver {
 
   void prepare_reading() {
     const SurfaceReading::Surface surface{tracer_, points(), surface_->paths().world().senders, vertices_};
-    reading_ = SurfaceReading::of_all(
+    reading_ = std::make_unique<SurfaceReading>(SurfaceReading::of_all(
         surface, receiver_, params_.neighbours, [this](std::span<const std::uint32_t> some) { gather(some); },
-        threads_);
+        threads_));
     std::vector<TransferPoint> own;
     for (const std::uint32_t v : reading_->alone()) own.push_back(vertices_[v]);
     rows_->add(own, threads_, out_.stats.gather_rays);
@@ -324,7 +324,7 @@ class Solver {
   std::vector<std::uint32_t> receiver_;  // the point of each row
   Table gathered_;                       // of the receivers
   double mean_sky_ = 1, mean_lamps_ = 0;
-  std::optional<SurfaceReading> reading_;
+  std::unique_ptr<SurfaceReading> reading_;
   SweptTransfer out_;
 };
 

@@ -2,14 +2,21 @@
 // meshless rows, the paper's own scheme on the same points, core/prt's vertices (direct light of lamps, then its
 // Neumann series), and the plain path estimator.
 //   kiln_radiosity [scene: cornell | bunny | all] [repeats] [method: rows | paper | vertices | paths | all]
+//   kiln_radiosity table: the paper's tables 1 and 2 of our scenes, in Markdown
 
 #include "core/meshless/radiosity.h"
 
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <string>
 
+#include "core/meshless/link_builder.h"
 #include "core/meshless/paper_bounces.h"
 #include "core/prt/interreflection.h"
 #include "core/prt/ray_origin.h"
@@ -148,6 +155,134 @@ void run_paths(const Case& c, int samples, Threads& threads) {
   print(c, "paths", "samples " + std::to_string(samples), {seconds}, values);
 }
 
+/// The model on the floor of a closed room four times as wide, under a lamp in the ceiling.
+Scene in_a_room(Scene scene) {
+  Vec3f least = scene.mesh.position.at(0), most = least;
+  for (const Vec3f& p : scene.mesh.position)
+    for (std::size_t k = 0; k < 3; ++k) least[k] = std::min(least[k], p[k]), most[k] = std::max(most[k], p[k]);
+  const Vec3f size = most - least, middle = (least + most) * 0.5F;
+  const float wide = 2 * std::max({size.x, size.y, size.z});
+  const Vec3f low{middle.x - wide, least.y - 1e-4F * wide, middle.z - wide},
+      high{middle.x + wide, least.y + 1.5F * wide, middle.z + wide};
+  const auto add_quad = [&](int part, const Vec3f& corner, const Vec3f& a, const Vec3f& b) {
+    Mesh& m = scene.mesh;
+    const auto first = static_cast<std::uint32_t>(m.position.size());
+    for (const Vec3f& p : {corner, corner + a, corner + a + b, corner + b}) {
+      m.position.push_back(p), m.normal.push_back(normalized(cross(a, b)));
+    }
+    m.uv0.resize(m.uv0.empty() ? 0 : m.position.size()), m.uv1.resize(m.uv1.empty() ? 0 : m.position.size());
+    m.color.resize(m.color.empty() ? 0 : m.position.size(), {1, 1, 1, 1});
+    m.tangent.resize(m.tangent.empty() ? 0 : m.position.size(), {1, 0, 0, 1});
+    m.triangles.push_back({first, first + 1, first + 2}), m.triangles.push_back({first, first + 2, first + 3});
+    m.part.insert(m.part.end(), 2, static_cast<std::uint32_t>(part));
+  };
+  const auto add_part = [&](const Material& material) {
+    scene.materials.push_back(material);
+    scene.parts.push_back({.name = material.name, .material = static_cast<int>(scene.materials.size()) - 1});
+    return static_cast<int>(scene.parts.size()) - 1;
+  };
+  const int walls = add_part({.name = "walls", .base_color = {0.7F, 0.7F, 0.7F, 1}, .metallic = 0}),
+            lamp = add_part(
+                {.name = "lamp", .base_color = {0.7F, 0.7F, 0.7F, 1}, .metallic = 0, .emission = {10, 10, 10}});
+  const Vec3f x{high.x - low.x, 0, 0}, y{0, high.y - low.y, 0}, z{0, 0, high.z - low.z};
+  add_quad(walls, low, z, x), add_quad(walls, low + y, x, z);
+  add_quad(walls, low, x, y), add_quad(walls, low + z, y, x);
+  add_quad(walls, low, y, z), add_quad(walls, low + x, z, y);
+  add_quad(lamp, low + y * 0.999F + (x + z) * 0.4F, x * 0.2F, z * 0.2F);
+  // Back into the unit cube.
+  const float side = std::max({x.x, y.y, z.z});
+  for (Vec3f& p : scene.mesh.position) p = (p - (low + high) * 0.5F) / side;
+  return scene;
+}
+
+double peak_megabytes() {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  return static_cast<double>(used.ru_maxrss) / 1024;
+}
+
+std::uint64_t sum_of(const std::vector<std::uint32_t>& numbers) {
+  std::uint64_t sum = 0;
+  for (const std::uint32_t n : numbers) sum += n;
+  return sum;
+}
+
+/// A process of its own, so that its memory is that of this scene.
+template <class F>
+void apart(const F& work) {
+  std::fflush(stdout);
+  const pid_t child = fork();
+  if (child == 0) {
+    work();
+    std::fflush(stdout);
+    _exit(0);
+  }
+  int status = 0;
+  if (child > 0) waitpid(child, &status, 0);
+  if (child < 0 || status != 0) std::printf("| did not end (%d) |\n", status);
+}
+
+void table_row(const std::string& name, const Scene& scene, const Environment* sky) {
+  Threads threads(2);
+  Clock clock;
+  clock.begin("tracer");
+  const Tracer tracer(scene, threads);
+  const RadiosityResult r =
+      solve_radiosity(tracer, sky, {.stage = [&](std::string_view stage) { clock.begin(stage); }}, threads);
+  clock.begin("end");
+  const auto& s = clock.stages;
+  const auto of = [&](const char* stage) { return s.contains(stage) ? s.at(stage) : 0; };
+  std::printf("| %s | %zu | %llu, %llu | %.1f M, %.1f M | %zu | %.0f | %.2f, %.2f, %.2f | %.2f | %.2f |\n",
+              name.c_str(), scene.mesh.triangles.size(), static_cast<unsigned long long>(sum_of(r.stats.points)),
+              static_cast<unsigned long long>(sum_of(r.stats.gathered)), double(r.stats.direct_rays) / 1e6,
+              double(r.stats.gather_rays) / 1e6, r.stats.points.size(), peak_megabytes(), of("points"), of("basis"),
+              of("reading") + of("sweeps"), of("gather") + of("direct"), process_seconds() - clock.start);
+}
+
+void links_row(const std::string& name, const Scene& scene) {
+  Threads threads(2);
+  const double start = process_seconds();
+  const Tracer tracer(scene, threads);
+  LinkBuilder builder(tracer, {}, threads);
+  const LightLinks links = builder.finish(scene.mesh, threads);
+  const double bytes = double(links.links.size() * 8 + links.samples.size() * 16 + links.rows() * 24);
+  std::printf("| %s | %u, %zu | %.1f M | %.2f M, %.2f %% | %.1f | %.0f | %.1f |\n", name.c_str(), links.senders,
+              links.rows() - links.senders, double(builder.stats().rays) / 1e6, double(links.links.size()) / 1e6,
+              100 * links.share_of_possible(), bytes / 1e6, peak_megabytes(), process_seconds() - start);
+}
+
+int print_table() {
+  struct Row {
+    std::string name, path;
+    bool sky, room;
+  };
+  const std::vector<Row> rows{
+      {"Cornell box of the references", "references/cornell.glb", false, false},
+      {"dungeon, its lamps and a clear sky", "scenes/dungeon-interior/level-dungeon.gltf", true, false},
+      {"hotel room, clear sky", "scenes/hotel-room/scene.glb", true, false},
+      {"buddha in a room", "scenes/buddha/buddha.glb", false, true}};
+  const auto for_each = [&](const auto& print) {
+    for (const Row& row : rows) {
+      apart([&] {
+        auto scene = testing::load_scene(KILN_SHARED, row.path);
+        if (!scene) return std::printf("| %s | is not there |\n", row.name.c_str()), void();
+        if (row.room) scene = in_a_room(std::move(*scene));
+        print(row, *scene);
+      });
+    }
+  };
+  std::printf(
+      "| radiosity, default | triangles | points placed, gathered at | rays: direct, gathers | levels | peak MB | s: "
+      "points, basis, reading and sweeps | s: rays | s: all |\n|---|---|---|---|---|---|---|---|---|\n");
+  const Environment sky = clear_sky_with_sun();
+  for_each([&](const Row& row, const Scene& scene) { table_row(row.name, scene, row.sky ? &sky : nullptr); });
+  std::printf(
+      "\n| transport, default | senders, receivers | rays | links, of possible | MB | peak MB | s "
+      "|\n|---|---|---|---|---|---|---|\n");
+  for_each([](const Row& row, const Scene& scene) { links_row(row.name, scene); });
+  return 0;
+}
+
 std::vector<Case> load(const std::string& only) {
   std::vector<Case> out;
   for (const std::string name : {"cornell", "bunny"}) {
@@ -173,6 +308,7 @@ int main(int argc, char** argv) {
   using namespace kiln::bench;
   const std::string scene = argc > 1 ? argv[1] : "all", method = argc > 3 ? argv[3] : "all";
   const int repeats = argc > 2 ? std::max(1, std::atoi(argv[2])) : 1;
+  if (scene == "table") return print_table();
   Threads threads(2);
   for (const Case& c : load(scene)) {
     const auto rows = [&](const std::string& knobs, const Radiosity& r) { run_points(c, knobs, r, repeats, threads); };

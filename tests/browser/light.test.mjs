@@ -6,10 +6,10 @@ import { load } from './sources.mjs';
 
 const { evaluateSh, rotateAboutY, projectFunction, clampedCosineTransfer, shCount } = await load('light/sh.ts');
 const { sphereQuadrature } = await load('light/quadrature.ts');
-const { directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
+const { brightOf, directionAt, lightToEquirect, projectEquirect, shrinkEquirect, softened } = await load('light/equirect.ts');
 const { coefficientsOf, triangleMeasure, pickCoefficient, quantile } = await load('light/transfer.ts');
-const { lightOfStored, readExtension } = await load('asset/kiln_reader.ts');
-const { kSkies, projectSky } = await load('light/skies.ts');
+const { addParts, lightOfStored, readExtension } = await load('asset/kiln_reader.ts');
+const { kSkies, projectSky, projectSuns } = await load('light/skies.ts');
 const { encodeState, decodeState, kDefaultState } = await load('main/view_state.ts');
 const { edgesOf } = await load('main/wireframe.ts');
 
@@ -260,4 +260,34 @@ test('of a radiosity job’s own map there is no picture; of a named sky, of no 
     [pictured(0, 'courtyard.hdr'), pictured(0, 'clear'), pictured(0, ''), pictured(4, 'courtyard.hdr')],
     [false, true, true, true],
   );
+});
+
+test('light is added up in two parts, neither below 0', () => {
+  const values = Float32Array.of(5, -1, -4, 2); // all of it
+  addParts(values, Float32Array.of(2, -3, 1, 2)); // of that the bright part
+  assert.deepEqual([...values], [3 + 2, 2 + 0, 0 + 1, 0 + 2]);
+});
+
+test('the bright part of a map is what is above eight times the mean of the rest, in its colour', () => {
+  const map = (texels) => ({ width: 64, height: 32, stride: 4, data: Float32Array.from(texels.flat()) });
+  const grey = Array.from({ length: 64 * 32 }, () => [1, 1, 1, 1]);
+  assert.equal(brightOf(map(grey)), null);
+  grey[700] = [3e6, 1e6, 0, 1];
+  grey[1500] = [100, 200, 300, 1];
+  const { data } = brightOf(map(grey));
+  for (let i = 0; i < grey.length; ++i) {
+    const rest = [0, 1, 2].map((c) => grey[i][c] - data[4 * i + c]);
+    assert.ok((rest[0] + rest[1] + rest[2]) / 3 <= 1.03 * 8, `${i}: ${rest}`); // as bright_part_test.cpp
+    if (i !== 700 && i !== 1500) assert.equal(data[4 * i], 0);
+  }
+  near(data[6002] / data[6000], 3, 1e-5);
+});
+
+test('suns are the bright part of a sky', () => {
+  for (const sky of kSkies) {
+    const [all, suns] = [projectSky(sky, 4), projectSuns(sky, 4)];
+    const rest = projectFunction(4, sky.radiance);
+    assert.equal(suns.length, sky.suns.length > 0 ? all.length : 0);
+    for (let i = 0; i < suns.length; ++i) near(all[i], rest[i] + suns[i], 1e-5 * Math.max(1, Math.abs(all[i])), sky.id);
+  }
 });

@@ -89,5 +89,24 @@ TEST(Evaluate, InterpolatesAsAViewerDoes) {
   EXPECT_EQ(middle, (value_at(scene.transfer, 1, light) + value_at(scene.transfer, 2, light)) * 0.5F);
 }
 
+TEST(Evaluate, ShowsNoPartOfTheLightBelowZero) {
+  BakedScene scene = single_triangle(1, 3, true);
+  for (std::size_t i = 0; i < scene.transfer.coefficients.size(); ++i)
+    scene.transfer.coefficients[i] = static_cast<float>(i);
+  const std::vector<Vec3f> bright{{-1, 2, -3}}, rest{{4, -5, 6}}, all{{3, -3, 3}};
+  for (std::size_t v = 0; v < 3; ++v) {
+    const Vec3f lamps = value_at(scene.transfer, v, {}),
+                t = value_at(scene.transfer, v, std::vector<Vec3f>{{1, 1, 1}}) - lamps;
+    Vec3f expected;
+    for (std::size_t c = 0; c < 3; ++c)
+      expected[c] = std::max(0.0F, t[c] * rest[0][c] + lamps[c]) + std::max(0.0F, t[c] * bright[0][c]);
+    EXPECT_EQ(shown_at(scene.transfer, v, {all, bright}), expected) << v;
+    EXPECT_EQ(shown_at(scene.transfer, v, {all}), value_at(scene.transfer, v, all)) << v;
+    EXPECT_EQ(shown_values(scene.transfer, {all, bright})[v], expected) << v;
+  }
+  const Vec3f middle = shown_at(scene.transfer, TrianglePoint{{0, 1, 2}, 0.5F, 0.5F}, {all, bright});
+  EXPECT_EQ(middle, (shown_at(scene.transfer, 1, {all, bright}) + shown_at(scene.transfer, 2, {all, bright})) * 0.5F);
+}
+
 }  // namespace
 }  // namespace kiln

@@ -190,13 +190,15 @@ TEST(BakedScene, PartsKeepNameMaterialAndAttributes) {
 
 TEST(BakedScene, FrameLightExposureAndProvenanceComeBack) {
   BakedScene written = random_baked({.order = 2});
-  written.light = {"sky \"A\"", {{1, 2, 3}, {0.1F, -0.2F, 0.3F}, {0, 0, 1e-7F}, {1e9F, 0, -1}}};
+  written.light = {"sky \"A\"", {{1, 2, 3}, {0.1F, -0.2F, 0.3F}, {0, 0, 1e-7F}, {1e9F, 0, -1}}, {}};
+  written.light.bright = {{1, 0, 2}, {-0.5F, 0, 0}, {0, 3, 0}, {0, 0, 0.25F}};
   written.exposure = 0.37F;
   const BakedScene read = round_trip(written);
   EXPECT_EQ(read.scene.frame.scale, written.scene.frame.scale);
   EXPECT_EQ(read.scene.frame.center, written.scene.frame.center);
   EXPECT_EQ(read.light.name, written.light.name);
   EXPECT_EQ(read.light.coefficients, written.light.coefficients);
+  EXPECT_EQ(read.light.bright, written.light.bright);
   EXPECT_EQ(read.exposure, written.exposure);
   EXPECT_EQ(read.provenance, written.provenance);
 }

@@ -46,8 +46,8 @@ Scene plate(float roughness) {
 OutgoingLight baked(const Tracer& tracer, bool apart, Threads& threads) {
   const std::vector<Vec3f> value(tracer.scene().mesh.position.size());
   const GatherFaces faces(tracer.scene());
-  return bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 2, .rays = 128, .lamps_apart = apart},
-                       threads);
+  return bake_outgoing({tracer, faces, nullptr, nullptr}, {tracer.scene(), value},
+                       {.degree = 2, .rays = 128, .lamps_apart = apart}, threads);
 }
 
 /// Largest difference between what the field and core/trace say, and the largest that core/trace says: at the middles

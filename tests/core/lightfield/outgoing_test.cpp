@@ -40,7 +40,7 @@ Made make(const Tracer& tracer, const Environment& sky, OutgoingBake params, Thr
   Made out;
   for (std::size_t v = 0; v < r.direct.size(); ++v) out.value.push_back(r.direct[v] + r.indirect[v]);
   const GatherFaces faces(tracer.scene());
-  out.light = bake_outgoing({tracer, faces, r.surface.get(), &sky}, out.value, params, threads);
+  out.light = bake_outgoing({tracer, faces, r.surface.get(), &sky}, {tracer.scene(), out.value}, params, threads);
   return out;
 }
 
@@ -119,8 +119,8 @@ TEST(Outgoing, InTheOpenTheSkyIsAllApart) {
   const std::vector<Vec3f> value(scene.mesh.position.size());
   const GatherFaces faces(scene);
   const auto bake = [&](bool apart) {
-    return bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 4, .rays = 512, .sky_apart = apart},
-                         threads);
+    return bake_outgoing({tracer, faces, nullptr, &sky}, {tracer.scene(), value},
+                         {.degree = 4, .rays = 512, .sky_apart = apart}, threads);
   };
   const auto largest = [](const OutgoingLight& light) {
     double most = 0;
@@ -180,8 +180,8 @@ TEST(Outgoing, RoughSurfacesKeepNoSkyApart) {
   const std::vector<Vec3f> value(scene.mesh.position.size());
   const GatherFaces faces(scene);
   const auto bake = [&](bool apart) {
-    return bake_outgoing({tracer, faces, nullptr, &sky}, value, {.degree = 3, .rays = 128, .sky_apart = apart},
-                         threads);
+    return bake_outgoing({tracer, faces, nullptr, &sky}, {tracer.scene(), value},
+                         {.degree = 3, .rays = 128, .sky_apart = apart}, threads);
   };
   const OutgoingLight asked = bake(true), not_asked = bake(false);
   EXPECT_FALSE(asked.field.has_sky());
@@ -199,7 +199,7 @@ TEST(Outgoing, SameBitsForAnyNumberOfThreads) {
     const std::vector<Vec3f> value(scene.mesh.position.size(), {0.5F, 0.5F, 0.5F});
     const GatherFaces faces(scene);
     const OutgoingLight made =
-        bake_outgoing({tracer, faces, nullptr, &sky}, value,
+        bake_outgoing({tracer, faces, nullptr, &sky}, {tracer.scene(), value},
                       {.degree = 3, .rays = 128, .sky_apart = true, .lamps_apart = true}, threads);
     ASSERT_TRUE(made.field.has_lamps());
     std::vector<float> numbers = made.field.coefficients;
@@ -221,7 +221,7 @@ TEST(Outgoing, WhatGlowsInTheDarkLooksTheSameFromEverywhere) {
   const std::vector<Vec3f> value(scene.mesh.position.size());
   const GatherFaces faces(scene);
   const OutgoingLight made =
-      bake_outgoing({tracer, faces, nullptr, nullptr}, value, {.degree = 4, .rays = 128}, threads);
+      bake_outgoing({tracer, faces, nullptr, nullptr}, {tracer.scene(), value}, {.degree = 4, .rays = 128}, threads);
   const Triangle& t = scene.mesh.triangles[0];
   for (const Vec3d& v : {Vec3d{0, 1, 0}, normalized(Vec3d{1, 0.1, 0})}) {
     const Vec3d seen = seen_radiance(made.field, nullptr, {t, 0.3, 0.3, to_double(scene.mesh.normal[t[0]]), v});

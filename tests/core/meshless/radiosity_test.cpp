@@ -280,6 +280,19 @@ TEST(Radiosity, FollowsLightInTheGapBetweenALampAndItsCeiling) {
   }
 }
 
+TEST(Radiosity, ReadsAPlaceAloneAsAmongOthers) {
+  const Scene scene = lamp_room();
+  Threads threads(2);
+  const Tracer tracer(scene, threads);
+  const std::vector<TransferPoint> places = vertex_points(scene.mesh);
+  const std::span<const TransferPoint> some = std::span(places).first(places.size() / 3);
+  ReflectedLight reflected(tracer, nullptr, {.points = {.wanted = 1000}, .rays = 64}, {}, threads);  // asked by nobody
+  const std::vector<Vec3f> all = reflected.at(places, threads), first = reflected.at(some, threads);
+  for (std::size_t i = 0; i < first.size(); ++i) EXPECT_EQ(all[i], first[i]) << i;
+  for (std::size_t i = 0; i < places.size(); i += 97) EXPECT_EQ(reflected.at({&places[i], 1}, threads)[0], all[i]) << i;
+  EXPECT_GT(all[0].x + all[places.size() / 2].x, 0);
+}
+
 TEST(Radiosity, OfVerticesInsideASolidIsDark) {
   Scene scene = lamp_room();
   const std::size_t first = scene.mesh.position.size();

@@ -35,7 +35,7 @@ export interface RadianceTransferExtension {
   scale: number[];
   offset: number[];
   glossy?: GlossyExtension;
-  light?: { name?: string; coefficients?: number[][] };
+  light?: { name?: string; coefficients?: number[][]; bright?: number[][] };
   look?: { exposure?: number; toneMap?: string };
   units?: string;
 }
@@ -117,6 +117,15 @@ export async function readRadianceTransfer(gltf: LoadedGltf): Promise<RadianceTr
 /// light[3 * i + channel] of the bake; empty when it had no environment.
 export const bakedLight = ({ light }: Pick<RadianceTransferExtension, 'light'>): Float32Array =>
   Float32Array.from((light?.coefficients ?? []).flat());
+
+/// Of that light the part that few bands cannot hold, in the same shape; empty: there is none.
+export const brightLight = ({ light }: Pick<RadianceTransferExtension, 'light'>): Float32Array =>
+  Float32Array.from((light?.bright ?? []).flat());
+
+/// Adds up light in two parts, each at least 0: values[i] of all of it becomes max(0, all - bright) + max(0, bright).
+export function addParts(values: Float32Array, bright: Float32Array): void {
+  for (let i = 0; i < values.length; ++i) values[i] = Math.max(0, values[i] - bright[i]) + Math.max(0, bright[i]);
+}
 
 /// The mean and the rows of the components, from the bytes of their buffer view (little endian). Throws on another size.
 export const componentRows = (e: RadianceTransferExtension, bytes: ArrayBuffer): Float32Array =>

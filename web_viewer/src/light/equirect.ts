@@ -49,6 +49,35 @@ export function projectEquirect(map: EquirectMap, order: number): Float32Array {
   return Float32Array.from(sums);
 }
 
+const kBright = 8; // times the mean of the rest
+
+/// The part of a map that few bands cannot hold, as core/scene/bright_part.h has it; null: it has none.
+export function brightOf(map: EquirectMap): EquirectMap | null {
+  const sizes = Float64Array.from({ length: map.width * map.height }, (_, i) => {
+    const at = i * map.stride;
+    return (map.data[at] + map.data[at + 1] + map.data[at + 2]) / 3;
+  });
+  let most = Infinity;
+  for (let round = 0; round < 64; ++round) most = kBright * meanBelow(map, sizes, most);
+  if (!sizes.some((size) => size > most)) return null;
+  const data = Float32Array.from(map.data, (x, at) => {
+    const size = sizes[Math.floor(at / map.stride)];
+    return size > most ? x * (1 - most / size) : 0;
+  });
+  return { ...map, data };
+}
+
+/// Over all directions, of what is left where nothing is larger than `most`.
+function meanBelow(map: EquirectMap, sizes: Float64Array, most: number): number {
+  let [sum, weights] = [0, 0];
+  for (let row = 0; row < map.height; ++row) {
+    const weight = Math.cos((0.5 - (row + 0.5) / map.height) * Math.PI);
+    for (let column = 0; column < map.width; ++column) sum += weight * Math.min(most, sizes[row * map.width + column]);
+    weights += weight * map.width;
+  }
+  return sum / weights;
+}
+
 /// A function on the sphere as a picture of `width` x `width / 2` texels, rows from the top, RGBA.
 export function functionToEquirect(
   radiance: (x: number, y: number, z: number, rgb: Float64Array) => void,

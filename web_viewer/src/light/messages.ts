@@ -17,6 +17,7 @@ export interface OpenRequest {
 export interface RelightRequest {
   kind: 'relight';
   light: Float32Array;
+  bright: Float32Array; // its bright part (brightOf in equirect.ts); empty: none
   lamps: boolean;
   reuse: Float32Array[]; // arrays to write to, one per part; or none
 }
@@ -34,6 +35,7 @@ export interface LampRequest {
 export interface LevelRequest {
   kind: 'level';
   light: Float32Array;
+  bright: Float32Array;
 }
 
 export interface MeasureRequest {
@@ -67,6 +69,7 @@ export interface ValuesReply {
 
 export interface ProjectReply {
   light: Float32Array;
+  bright: Float32Array;
   map: EquirectMap;
 }
 

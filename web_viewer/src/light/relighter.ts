@@ -7,6 +7,9 @@ import type { SkyData } from '../asset/mirrored_sky';
 import type { PointLamp } from './links';
 import type { ProjectReply, Reply, Request, ValuesReply } from './messages';
 
+/// Coefficients of a light, and of its bright part (empty: none), which is added up apart.
+export type LightParts = { light: Float32Array; bright: Float32Array };
+
 type Answer = { resolve(reply: Reply): void; reject(error: Error): void };
 
 export class Relighter {
@@ -49,8 +52,8 @@ export class Relighter {
   }
 
   /// Light at every vertex of every part. `reuse`: arrays of an earlier reply that are no longer needed.
-  relight(light: Float32Array, lamps: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
-    return this.values({ kind: 'relight', light, lamps, reuse }, buffersOf(reuse));
+  relight(light: LightParts, lamps: boolean, reuse: Float32Array[]): Promise<ValuesReply> {
+    return this.values({ kind: 'relight', ...light, lamps, reuse }, buffersOf(reuse));
   }
 
   /// What a lamp reflects to every vertex of every part. `seen`: a byte for each of the samples; is given away.
@@ -58,8 +61,8 @@ export class Relighter {
     return this.values({ kind: 'lamp', lamp, seen, baked, reuse }, [seen.buffer, ...buffersOf(reuse)]);
   }
 
-  async level(light: Float32Array): Promise<number> {
-    return (await this.values({ kind: 'level', light })).range;
+  async level(light: LightParts): Promise<number> {
+    return (await this.values({ kind: 'level', ...light })).range;
   }
 
   measure(weighted: boolean): Promise<ValuesReply> {

@@ -114,6 +114,14 @@ export function skyPicture(sky: Sky, width: number): EquirectMap {
 /// SH coefficients of a sky, flat RGB. A sun counts as a point of its irradiance.
 export function projectSky(sky: Sky, order: number): Float32Array {
   const light = projectFunction(order, sky.radiance);
+  const suns = projectSuns(sky, order);
+  for (let i = 0; i < suns.length; ++i) light[i] += suns[i];
+  return light;
+}
+
+/// Of the suns alone, the bright part of the sky; empty without any.
+export function projectSuns(sky: Sky, order: number): Float32Array {
+  const light = new Float32Array(sky.suns.length > 0 ? 3 * shCount(order) : 0);
   const basis = new Float64Array(shCount(order));
   for (const { direction, irradiance } of sky.suns) {
     const length = Math.hypot(...direction);

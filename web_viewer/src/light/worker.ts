@@ -2,12 +2,13 @@
 
 import { loadDraco } from '../asset/draco_module';
 import type { FieldTexels } from '../asset/light_field';
-import { arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
+import { addParts, arrivingLight, lightOfStored, type StoredTransfer } from '../asset/kiln_reader';
 import { readPacked, unpack, type BakedPrimitive, type Unpacked } from '../asset/unpack';
 import { gatherRows, type LightLinks, lightSenders, readVertices, solveNodes } from './links';
-import { projectEquirect, shrinkEquirect } from './equirect';
+import { brightOf, projectEquirect, shrinkEquirect } from './equirect';
 import type {
   LampRequest,
+  LevelRequest,
   OpenRequest,
   ProjectReply,
   ProjectRequest,
@@ -20,6 +21,8 @@ import { coefficientsOf, pickCoefficient, quantile, triangleMeasure } from './tr
 
 const kProjectedWidth = 512; // maps are shrunk to this before projection: far above what order 10 resolves
 const kShownWidth = 1024;
+
+const kDark = new Float32Array(0);
 
 const decoder = loadDraco(); // begun before there is anything to decode
 decoder.catch(() => undefined); // is awaited by open()
@@ -57,7 +60,7 @@ function samplesOf({ samples, sampleNormals }: LightLinks): Float32Array<ArrayBu
 
 function lampLight({ lamp, seen, baked, reuse }: LampRequest): Float32Array[] {
   if (!links) throw new Error('this file has no links for lamps that move');
-  const own = baked ? relight(new Float32Array(0), true, []) : [];
+  const own = baked ? relight({ light: kDark, bright: kDark, lamps: true, reuse: [] }) : [];
   const rows = gatherRows(links, solveNodes(links, lightSenders(links, lamp, seen)));
   let first = 0;
   return parts.map(({ normals }, i) => {
@@ -69,8 +72,13 @@ function lampLight({ lamp, seen, baked, reuse }: LampRequest): Float32Array[] {
   });
 }
 
-const relight = (light: Float32Array, lamps: boolean, reuse: Float32Array[]): Float32Array[] =>
-  parts.map(({ stored }, i) => lightOfStored(transfer, stored, light, lamps, reuse[i]));
+function relight({ light, bright, lamps, reuse }: Omit<RelightRequest, 'kind'>): Float32Array[] {
+  return parts.map(({ stored }, i) => {
+    const values = lightOfStored(transfer, stored, light, lamps, reuse[i]);
+    if (bright.length > 0) addParts(values, lightOfStored(transfer, stored, bright, false));
+    return values;
+  });
+}
 
 /// What arrives at the parts that have matrices; nothing for others.
 const arrive = (light: Float32Array, lamps: boolean): Float32Array[] =>
@@ -79,8 +87,8 @@ const arrive = (light: Float32Array, lamps: boolean): Float32Array[] =>
   );
 
 /// Lamps count: they are there whatever the sky.
-function level(light: Float32Array): number {
-  const brightest = relight(light, true, []).map((values) =>
+function level({ light, bright }: LevelRequest): number {
+  const brightest = relight({ light, bright, lamps: true, reuse: [] }).map((values) =>
     Float32Array.from({ length: values.length / 3 }, (_, v) =>
       Math.max(values[3 * v], values[3 * v + 1], values[3 * v + 2]),
     ),
@@ -101,8 +109,13 @@ function coefficient(channel: number, slot: number): Float32Array[] {
 async function project(request: ProjectRequest): Promise<ProjectReply> {
   const { readEnvironment } = await import('./read_environment');
   const map = await readEnvironment(request.name, request.file);
-  const light = projectEquirect(shrinkEquirect(map, kProjectedWidth), request.order);
-  return { light, map: shrinkEquirect(map, kShownWidth) };
+  const shrunk = shrinkEquirect(map, kProjectedWidth);
+  const bright = brightOf(shrunk);
+  return {
+    light: projectEquirect(shrunk, request.order),
+    bright: bright ? projectEquirect(bright, request.order) : kDark.slice(),
+    map: shrinkEquirect(map, kShownWidth),
+  };
 }
 
 /// Colour scales end at the 99th percentile of the magnitudes over all parts.
@@ -120,9 +133,9 @@ function timed(compute: () => Float32Array[], ranged: boolean): ValuesReply {
   return { values, arriving: [], range: ranged ? rangeOf(values) : 0, milliseconds };
 }
 
-function relit({ light, lamps, reuse }: RelightRequest): ValuesReply {
+function relit(request: RelightRequest): ValuesReply {
   const start = performance.now();
-  const [values, arriving] = [relight(light, lamps, reuse), arrive(light, lamps)];
+  const [values, arriving] = [relight(request), arrive(request.light, request.lamps)];
   return { values, arriving, range: 0, milliseconds: performance.now() - start };
 }
 
@@ -133,7 +146,7 @@ function compute(request: Exclude<Request, OpenRequest | ProjectRequest>): Value
     case 'lamp':
       return timed(() => lampLight(request), false);
     case 'level':
-      return { values: [], arriving: [], range: level(request.light), milliseconds: 0 };
+      return { values: [], arriving: [], range: level(request), milliseconds: 0 };
     case 'measure':
       return timed(() => measure(request.weighted), true);
     case 'coefficient':
@@ -158,7 +171,7 @@ addEventListener('message', async ({ data }: MessageEvent<Request & { serial: nu
       send({ serial, opened, samples, field, sky, lamps, lobes, points, progressive }, [opened, ...give.map(({ buffer }) => buffer)]);
     } else if (data.kind === 'project') {
       const projected = await project(data);
-      send({ serial, projected }, [projected.light.buffer, projected.map.data.buffer]);
+      send({ serial, projected }, [projected.light.buffer, projected.bright.buffer, projected.map.data.buffer]);
     } else {
       const values = compute(data);
       send({ serial, values }, [...values.values, ...values.arriving].map((array) => array.buffer));

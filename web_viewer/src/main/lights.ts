@@ -1,8 +1,9 @@
 // The lights a viewer can choose from, as SH coefficients of one order, before rotation and intensity.
 
-import { bakedLight, type RadianceTransferExtension } from '../asset/kiln_reader';
+import { bakedLight, brightLight, type RadianceTransferExtension } from '../asset/kiln_reader';
 import { functionToEquirect, lightToEquirect, softened, type EquirectMap } from '../light/equirect';
-import { kSkies, projectSky, skyPicture, type Sky, type Sun } from '../light/skies';
+import type { LightParts } from '../light/relighter';
+import { kSkies, projectSky, projectSuns, skyPicture, type Sky, type Sun } from '../light/skies';
 import { rotateAboutY, withOrder } from '../light/sh';
 
 export interface LightChoice {
@@ -17,6 +18,7 @@ const kSameSky = 0.02; // core spreads the sun over texels of a map, we take a p
 
 export class Lights {
   private readonly known = new Map<string, Float32Array>();
+  private readonly bright = new Map<string, Float32Array>(); // of these the part that is added up apart; empty: none
   /// Brightness of the model under each light, unturned, at intensity 1; filled by the viewer.
   readonly levels = new Map<string, number>();
   private map: EquirectMap | null = null;
@@ -30,6 +32,8 @@ export class Lights {
     const baked = bakedLight(extension);
     [this.order, this.bakedName] = [order, light?.name ?? ''];
     this.known.set('baked', withOrder(baked, order));
+    const bright = brightLight(extension);
+    this.bright.set('baked', bright.length > 0 ? withOrder(bright, order) : bright);
     this.choices.push({
       id: 'baked',
       label: baked.length > 0 || (order === 0 && this.bakedName) ? `As baked: ${this.bakedName || 'environment'}` : 'As baked: no sky, lamps only',
@@ -37,8 +41,9 @@ export class Lights {
     if (order > 0) this.choices.push(...kSkies.map(({ id, label }) => ({ id, label })));
   }
 
-  addFile(name: string, light: Float32Array, map: EquirectMap): void {
+  addFile(name: string, { light, bright, map }: LightParts & { map: EquirectMap }): void {
     this.known.set('file', light);
+    this.bright.set('file', bright);
     this.levels.delete('file');
     this.map = map;
     const place = this.choices.findIndex(({ id }) => id === 'file');
@@ -58,11 +63,18 @@ export class Lights {
     return light;
   }
 
+  parts(id: string): LightParts {
+    const sky = kSkies.find((one) => one.id === id);
+    if (!this.bright.has(id)) this.bright.set(id, sky ? projectSuns(sky, this.order) : new Float32Array(0));
+    return { light: this.coefficients(id), bright: this.bright.get(id)! };
+  }
+
   /// As the model receives it.
-  turned(id: string, rotation: number, intensity: number): Float32Array {
-    const light = rotateAboutY(this.order, this.coefficients(id), rotation);
-    for (let i = 0; i < light.length; ++i) light[i] *= intensity;
-    return light;
+  turned(id: string, rotation: number, intensity: number): LightParts {
+    const turn = (light: Float32Array) =>
+      light.length > 0 ? rotateAboutY(this.order, light, rotation).map((x) => x * intensity) : light;
+    const { light, bright } = this.parts(id);
+    return { light: turn(light), bright: turn(bright) };
   }
 
   /// What three's image-based light gets: no suns (its filter loses small bright spots; they come as lamps) and no detail.

@@ -131,8 +131,8 @@ export class PlainViewer {
   /// Reads a .hdr or .exr and makes it the light.
   async useFile(file: File): Promise<void> {
     const { relighter, pictures } = this.given;
-    const { light, map } = await relighter.project(file.name, await file.arrayBuffer(), kOrder);
-    this.lights.addFile(file.name, light, map);
+    const projected = await relighter.project(file.name, await file.arrayBuffer(), kOrder);
+    this.lights.addFile(file.name, projected);
     pictures.dispose();
     this.onLights();
     if (this.state.get().light === 'file') this.apply(new Set<keyof ViewState>(['light']));

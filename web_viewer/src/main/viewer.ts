@@ -169,7 +169,7 @@ export class Viewer {
     try {
       for (const id of light === 'baked' ? [] : ['baked', light]) {
         if (!this.lights.levels.has(id))
-          this.lights.levels.set(id, await this.relighter.level(this.lights.coefficients(id)));
+          this.lights.levels.set(id, await this.relighter.level(this.lights.parts(id)));
       }
       this.setLook();
     } catch (error) {
@@ -294,8 +294,8 @@ export class Viewer {
 
   /// Reads a .hdr or .exr and makes it the light.
   async useFile(file: File): Promise<void> {
-    const { light, map } = await this.finest.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
-    this.lights.addFile(file.name, light, map);
+    const projected = await this.finest.relighter.project(file.name, await file.arrayBuffer(), this.lights.order);
+    this.lights.addFile(file.name, projected);
     this.pictures.dispose();
     this.onLights();
     if (this.state.get().light === 'file') this.apply(new Set<keyof ViewState>(['light']));
