@@ -15,7 +15,7 @@
 namespace kiln {
 
 /// Part of every result's identity: the same scene, recipe and engine give the same bytes.
-inline constexpr const char* kEngineVersion = "0.18.0";
+inline constexpr const char* kEngineVersion = "0.19.0";
 
 struct BakeInput {
   SceneFiles scene;
