@@ -241,8 +241,8 @@ uint gridBits(int lattice, inout int brick, inout ivec3 cell, inout vec3 f, vec3
   uvec4 words[3];
   for (int i = 0; i < 3; ++i) words[i] = texelFetch(gridCorners, at * ivec3(3, 1, 1) + ivec3(i, 0, 0), 0);
   if (surface) {
-    vec3 long = abs(n);
-    int axis = long.x >= long.y && long.x >= long.z ? 0 : long.y >= long.z ? 1 : 2;
+    vec3 along = abs(n);
+    int axis = along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
     int side = 2 * axis + (n[axis] < 0.0 ? 1 : 0);
     uint offset = gridByte(words, 4 * side + 1);
     int above = offset != 0u && gridHeight(gridByte(words, 4 * side), f) >= float(offset) ? 1 : 0;
