@@ -1,4 +1,4 @@
-// kiln plan IN: what a bake would model and what it would skip, and why; nothing is baked.
+// kiln plan IN: what a bake would model and what it would skip, and why.
 #include <filesystem>
 
 #include "client_cli/commands.h"
@@ -22,8 +22,13 @@ Outcome<std::string> plan_here(const PlanOptions& options, Session& session) {
   KILN_TRY(files, load_files(options.input));
   Threads threads(recipe.limits.threads);
   const StopTogether together(session.interrupt, threads);
-  return or_failure(
-      plan_json({std::move(files), recipe, loaded.environment, loaded.environment_name, temporary_folder()}, threads));
+  return or_failure(plan_json({.scene = std::move(files),
+                               .recipe = recipe,
+                               .environment = loaded.environment,
+                               .environment_name = loaded.environment_name,
+                               .made_of = {},
+                               .spill_folder = temporary_folder()},
+                              threads));
 }
 
 Outcome<std::string> plan_there(const PlanOptions& options, Session& session) {

@@ -85,11 +85,13 @@ std::string reduction_text(const json& document) {
 std::string prediction_text(const json& plan) {
   if (!plan.contains("prediction")) return {};
   const json& p = plan["prediction"];
-  const std::string of = text_of(p, "of");
-  return "predicted" + (of.empty() || of == "the bake" ? "" : " for " + of) + ": " +
-         human_seconds(number_of(p, "seconds")) + ", " + human_bytes(number_of(p, "memory_bytes")) + " of memory, " +
-         human_bytes(number_of(p, "artifact_bytes")) + " of result, " + count(number_of(p, "triangles")) +
-         " triangles\n";
+  const std::string of = text_of(p, "of"), reason = text_of(p, "reason");
+  const bool floor = text_of(p, "ended_by") == "floor";
+  const std::string passes = p.contains("passes") ? ", " + count(number_of(p, "passes")) + " passes" : "";
+  return (floor ? "it does not look as if the promise can be kept: " + reason + "\n" : "") + "predicted" +
+         (of.empty() || of == "the bake" ? "" : " for " + of) + ": " + human_seconds(number_of(p, "seconds")) + ", " +
+         human_bytes(number_of(p, "memory_bytes")) + " of memory, " + human_bytes(number_of(p, "artifact_bytes")) +
+         " of result, " + count(number_of(p, "triangles")) + " triangles" + passes + "\n";
 }
 
 std::vector<std::string> warnings_of(const json& document) {

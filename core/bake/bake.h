@@ -47,7 +47,8 @@ struct Checkpoints {
 /// Bakes. Throws Cancelled when `threads` is stopped; a Fault names what is wrong with the input.
 Result<BakeOutput> bake(const BakeInput&, const Progress&, Threads&, const Checkpoints& = {});
 
-/// The plan of a bake as JSON (what is modelled, what skipped and why, predictions), nothing baked.
+/// The plan of a bake as JSON: what is modelled, what skipped and why, predictions. Of an error target the first pass
+/// is baked for a trial.
 Result<std::string> plan_json(const BakeInput&, Threads&);
 
 }  // namespace kiln

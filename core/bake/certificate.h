@@ -32,7 +32,7 @@ namespace kiln {
 
 struct CertificateOptions {
   std::uint64_t bake_rays = 0;  // what the bake sent: the certificate costs about 5 % of it, or more:
-  bool thorough = false;        // about a second where a promise hangs on it, else a tenth of one
+  bool thorough = false;        // about a second where an error target hangs on it, else a tenth of one
   std::uint64_t seed = 0;       // mixed so that it never repeats the bake's own samples
 };
 

@@ -36,7 +36,7 @@ struct GridCheck {
   const SphereGather::World& world;
   const GridBake& params;
   int bounces = -1;       // as baked; -1: all
-  bool thorough = false;  // a promise hangs on it
+  bool thorough = false;  // an error target hangs on it
 };
 
 GridCertificate certify_grid(const GridCheck&, Threads&);

@@ -52,7 +52,7 @@ struct LinksCheck {
   const Tracer& truth;         // the input's surface
   int bounces = -1;            // as baked; -1: all
   std::uint64_t bake_rays = 0;
-  bool thorough = false;  // a promise hangs on it
+  bool thorough = false;  // an error target hangs on it
   std::uint64_t seed = 0;
 };
 

@@ -15,30 +15,35 @@ namespace {
 using Ending = Outlook::Ending;
 
 constexpr std::size_t kMostPasses = 10;
-constexpr double kMostSamples = 8, kMostTriangles = 6;  // growth of one pass,
-constexpr double kMostCost = 8;                         // and of their product: a wrong guess costs no more than that
-constexpr double kLeastGrowth = 1.3;                    // below it another pass is not worth its cost
-constexpr double kShareOfWall = 0.8;                    // of limits.wall_s, beyond which the job would be killed
-constexpr double kMoreBands = 1.5;                      // cost of two more bands of a light field
-constexpr double kLessTarget = 0.8;                     // of a simplification that went too far
+constexpr double kMostCost = 8;       // of one pass: a wrong guess costs no more than that
+constexpr double kLeastGrowth = 1.3;  // below it another pass is not worth its cost
+constexpr double kShareOfWall = 0.8;  // of limits.wall_s, beyond which the job would be killed
+constexpr double kMoreBands = 1.5;    // cost of two more bands of a light field
+constexpr double kLessTarget = 0.8;   // of a simplification that went too far
 constexpr double kMaxRays = 65536;
 
 double square(double x) { return x * x; }
 
-/// What a pass costs, in shadow rays: it must not depend on a clock.
-struct Parts {
-  double direct, reflected, points, triangles;
+constexpr int kMoreOrders = 2;  // of one step
 
-  Parts(const PassRecord& pass, const PassKind& kind)
-      : direct(static_cast<double>(pass.rays - pass.bounce_rays)),
-        reflected(kind.gather_ray * static_cast<double>(pass.bounce_rays)),
-        points(kind.point * static_cast<double>(pass.points)),
-        triangles(kind.triangle * static_cast<double>(pass.triangles)) {}
-  double all() const { return direct + reflected + points + triangles; }
-};
+// What bands leave out of the job's light falls as order^-p. On the demo's column, orders 4 to 10: p = .5 under skies
+// with a sun (builtin clear; mondello), 1 in a chapel with windows, above 1.5 under the courtyard.
+constexpr double kUsualFall = 1, kBestFall = 1.5;
 
-/// Seconds that grow with rays and triangles.
-double work(const PassRecord& pass) { return std::max(1e-3, pass.seconds - pass.certificate_seconds); }
+double truncation_falls(int from, int to, double power) { return std::pow(static_cast<double>(from) / to, power); }
+
+/// The pass with the next order, had truncation fallen so. Rays take most of its time, and are as many.
+PassRecord with_more_bands(PassRecord pass) {
+  constexpr double kDearer = 1.3;  // two bands more; a guess
+  const int order = std::min(kMaxShOrder, pass.order + kMoreOrders);
+  const double falls = truncation_falls(pass.order, order, kUsualFall);
+  *pass.own_relrmse *= falls, *pass.own_high *= falls;
+  if (pass.sources.truncation) *pass.sources.truncation *= falls;
+  pass.order = order;
+  pass.seconds = pass.certificate_seconds + kDearer * pass.work();
+  pass.elapsed_s += pass.seconds;
+  return pass;
+}
 
 bool is_of(const PassRecord& record, const Plan& plan) {
   if (plan.field) return record.order == plan.field->outgoing.degree && record.samples == plan.field->outgoing.rays;
@@ -72,7 +77,15 @@ std::optional<Plan> Passes::end(Ending ending, std::string reason) {
   return std::nullopt;
 }
 
-bool Passes::transport_met() const { return promise_.target_error && all_.back().high <= *promise_.target_error; }
+/// Where no order can hold the job's own light to the target, what the bands leave out is the floor; less transport
+/// error than a third of it would lower the sum of both by less than a twentieth.
+double Passes::transport_target() const {
+  constexpr double kThird = 1 / 3.0;
+  const double target = *promise_.target_error;
+  return no_order_suffices() ? std::max(target, kThird * *all_.back().sources.truncation) : target;
+}
+
+bool Passes::transport_met() const { return promise_.target_error && all_.back().high <= transport_target(); }
 
 bool Passes::own_light_bound() const {
   return promise_.target_error && !fixed_.order && all_.back().own_high.has_value();
@@ -92,93 +105,7 @@ double Passes::time_growth() const {
   const double budget = promise_.time_budget_s.value_or(kShareOfWall * limits_.wall_s);
   const double reserve = std::max(0.2, 0.04 * budget);  // preview and report
   const double left = budget - reserve - now.elapsed_s - now.certificate_seconds;
-  return left / work(now);
-}
-
-/// Without points of their own the vertices, which are as the triangles, have the reflected rays.
-double Passes::cost(Growth g) const {
-  const Parts parts(all_.back(), kind_);
-  if (parts.points == 0)
-    return g.triangles * (parts.direct * g.direct + parts.reflected * g.reflected + parts.triangles) / parts.all();
-  return (g.triangles * (parts.direct * g.direct + parts.triangles) +
-          g.points * (parts.reflected * g.reflected + parts.points)) /
-         parts.all();
-}
-
-/// From two passes of one order that differ in triangles; that of its kind until there are such.
-double Passes::interpolation_power() const {
-  if (all_.size() < 2) return kind_.power;
-  const PassRecord& a = all_[all_.size() - 2];
-  const PassRecord& b = all_.back();
-  if (a.order != b.order || !(b.sources.interpolation > 0) || !(a.sources.interpolation > 0)) return kind_.power;
-  const double growth = std::log(static_cast<double>(b.triangles) / static_cast<double>(a.triangles));
-  if (growth < 0.2) return kind_.power;
-  return std::clamp(std::log(a.sources.interpolation / b.sources.interpolation) / growth, 0.25, 1.0);
-}
-
-/// The squared error of a pass that has grown.
-double Passes::predicted(Growth g) const {
-  const ErrorSources& s = all_.back().sources;
-  const double reflected = square(s.noise_of_reflections), direct = square(s.noise) - reflected;
-  return direct / g.direct + reflected / g.reflected +
-         square(s.interpolation) * std::pow(g.triangles, -2 * interpolation_power()) + square(s.bounce_tail) +
-         square(s.quantisation) + square(s.compression) + square(s.merging) +
-         square(s.points) * std::pow(g.points, -2 * kind_.points_power);
-}
-
-/// The fewest rays that leave so much noise, by Lagrange: rays of each kind as the root of noise over cost.
-Passes::Growth Passes::rays_for(double noise, const Growth& places) const {
-  Growth out = places;
-  const ErrorSources& s = all_.back().sources;
-  const Parts cost(all_.back(), kind_);
-  const double dear = kind_.point > 0 ? places.points / places.triangles : 1;  // a reflected ray, beside a direct one
-  const double reflected = square(s.noise_of_reflections), direct = std::max(0.0, square(s.noise) - reflected);
-  const auto limited = [](double growth) { return std::clamp(growth, 1.0, kMostSamples); };
-  out.direct = fixed_.direct ? 1 : kMostSamples, out.reflected = fixed_.reflected ? 1 : kMostSamples;
-  if (noise <= 0 || (fixed_.direct && fixed_.reflected)) return out;
-  const double reflected_cost = cost.reflected * dear;
-  if (!fixed_.direct && !fixed_.reflected) {
-    const double both = std::sqrt(direct * cost.direct) + std::sqrt(reflected * reflected_cost);
-    const auto growth = [&](double own, double price) { return own > 0 ? std::sqrt(own / price) * both / noise : 0; };
-    out.direct = limited(growth(direct, cost.direct)), out.reflected = limited(growth(reflected, reflected_cost));
-  }
-  if (!fixed_.reflected && (fixed_.direct || out.direct == 1))
-    out.reflected = limited(noise > direct ? reflected / (noise - direct) : kMostSamples);
-  if (!fixed_.direct && (fixed_.reflected || out.reflected == 1))
-    out.direct = limited(noise > reflected ? direct / (noise - reflected) : kMostSamples);
-  return out;
-}
-
-/// The cheapest growth that brings the error to `wanted`, or nearly as near to it as any.
-Passes::Growth Passes::towards(double wanted) const {
-  constexpr int kSteps = 48, kPointSteps = 24;
-  constexpr double kNearly = 1.25;  // of the squared error
-  std::vector<Growth> all;
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= (free_triangles() ? kSteps : 0); ++i) {
-    for (int k = 0; k <= (free_points() ? kPointSteps : 0); ++k) {
-      Growth noiseless;
-      noiseless.direct = noiseless.reflected = std::numeric_limits<double>::infinity();
-      noiseless.triangles = std::pow(kMostTriangles, i / double{kSteps});
-      noiseless.points = std::pow(kMostTriangles, k / double{kPointSteps});
-      const Growth growth = rays_for(square(wanted) - predicted(noiseless), noiseless);
-      least = std::min(least, predicted(growth));
-      all.push_back(growth);
-    }
-  }
-  const double near = std::max(square(wanted) * (1 + 1e-9), kNearly * least);
-  std::erase_if(all, [&](const Growth& g) { return predicted(g) > near; });
-  return *std::ranges::min_element(all, {}, [&](const Growth& g) { return cost(g); });
-}
-
-/// The lowest error that a cost of `most` buys.
-Passes::Growth Passes::within(double most) const {
-  double cheap = std::max(all_.back().relrmse, 1e-6), dear = cheap / 64;
-  for (int i = 0; i < 32; ++i) {
-    const double middle = std::sqrt(cheap * dear);
-    (cost(towards(middle)) > most ? dear : cheap) = middle;
-  }
-  return towards(cheap);
+  return left / now.work();
 }
 
 /// Of a light field whose degree is open: its last band holds so much that those beyond it are a part of the error.
@@ -222,7 +149,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   }
   if (plan.merge) {
     constexpr double kMerging = 0.25;  // of the error that is expected: a sixteenth of its square
-    const double share = kMerging * std::sqrt(predicted(growth)) / plan.merge->max_error;
+    const double share = kMerging * std::sqrt(this->growth().predicted(growth)) / plan.merge->max_error;
     const double less = std::min(1.0, share) / growth.triangles;  // shape may be what splits do not mend
     plan.merge->max_error *= less;
     plan.merge->max_reach *= less;
@@ -247,11 +174,12 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
     const Growth half{std::sqrt(growth.direct), std::sqrt(growth.reflected), std::sqrt(growth.points),
                       std::sqrt(growth.triangles)};
     const bool points = plan.radiosity && !plan.field;
-    if (points && cost(half) > kLeastGrowth) return grown(last, half, scene);
+    if (points && this->growth().cost(half) > kLeastGrowth) return grown(last, half, scene);
     return end(Ending::floor, "reached " + percent(all_.back().high) + "; " +
                                   (points ? "finer points, more rays or " : "") +
                                   "more triangles would need more than /limits/memory_mb");
   }
+  chosen_ = growth;
   for (Decision& d : plan.decisions) {
     const std::string reason = pass_reason();
     if (d.decision == "samples") d = {"samples", std::to_string(plan.samples), reason};
@@ -263,20 +191,26 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
   return plan;
 }
 
-/// Truncation falls about as order^-1.5 under skies with a sun: an order is tried only if ten bands may do.
-std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene) {
-  constexpr int kStep = 2;
+/// Ten bands would still leave out more than the target.
+bool Passes::no_order_suffices() const {
   const PassRecord& now = all_.back();
-  const double at_ten = *now.own_relrmse * std::pow(static_cast<double>(now.order) / kMaxShOrder, 1.5);
-  if (now.order >= kMaxShOrder || at_ten > *promise_.target_error) {
-    return end(Ending::floor, "transport reached " + percent(now.high) + " of " + percent(*promise_.target_error) +
-                                  ", but " + std::to_string(now.order) + " bands hold the job's own light only to " +
-                                  percent(*now.own_high) +
-                                  ": no order up to 10 suffices; a given /steps/0/order bounds transport alone");
+  const double left_out = now.sources.truncation.value_or(0);
+  return own_light_bound() && left_out * truncation_falls(now.order, kMaxShOrder, kBestFall) > *promise_.target_error;
+}
+
+std::optional<Plan> Passes::higher_order(const Plan& last, const Scene& scene) {
+  const PassRecord& now = all_.back();
+  if (now.order >= kMaxShOrder || no_order_suffices()) {
+    return end(Ending::floor,
+               std::to_string(now.order) + " bands hold the job's own light only to " + percent(*now.own_high) +
+                   ", and no order up to 10 suffices for " + percent(*promise_.target_error) + "; transport reached " +
+                   percent(now.high) +
+                   ". A given /steps/0/order bounds transport alone, a light without a sharp sun needs fewer bands, "
+                   "and the step radiosity holds any light");
   }
   if (time_growth() < kLeastGrowth) return end(Ending::time_spent, "the time ended before a higher order was baked");
   Plan plan = last;
-  plan.order = std::min(kMaxShOrder, now.order + kStep);
+  plan.order = std::min(kMaxShOrder, now.order + kMoreOrders);
   plan.prediction = predict(plan, scene);
   for (Decision& d : plan.decisions) {
     if (d.decision == "order")
@@ -293,7 +227,37 @@ const char* Passes::fixed_knob() const {
   return fixed_.triangles ? "/steps/0/subdivide" : fixed_.reflected ? kind_.rays : nullptr;
 }
 
+/// What the next pass may cost, in costs of the last one. A time that is more than one pass may take: so much of it
+/// that what is left is worth another one.
+double Passes::most_growth(double affordable) const {
+  const double step = promise_.time_budget_s ? std::min(4.0, affordable / 2.5) : kMostCost;
+  return affordable > kMostCost ? step : 0.9 * affordable;
+}
+
+/// The interval ends above the error: aims so that its end meets the target.
+Growth Passes::wanted(double most) const {
+  const PassRecord& now = all_.back();
+  if (promise_.target_error) {
+    const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
+    if (const Growth enough = growth().towards(aim); growth().cost(enough) < most) return enough;
+  }
+  return growth().within(most);
+}
+
+/// What is left open does not lower the error.
+bool Passes::idle(const Growth& growth) const {
+  constexpr double kSame = 0.9;  // of the squared error
+  const PassGrowth model = this->growth();
+  return model.cost(growth) < 1.05 ||
+         (fixed_knob() != nullptr && model.predicted(growth) > kSame * model.predicted({}));
+}
+
+Growth Passes::least_growth() const {
+  return {kLeastGrowth, kLeastGrowth, growth().free_points() ? kLeastGrowth : 1, kLeastGrowth};
+}
+
 std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
+  chosen_ = {};
   const PassRecord& now = all_.back();
   if (last.field && last.field->carried && !transport_met()) {
     return end(
@@ -327,26 +291,36 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
     return plan;
   }
 
-  // The interval ends above the error: aim so that its end meets the target.
-  // A time that is more than one pass may take: so much of it that what is left is worth another one.
-  const double step = promise_.time_budget_s ? std::min(4.0, affordable / 2.5) : kMostCost;
-  const double all = affordable > kMostCost ? step : 0.9 * affordable;
-  const double most = bands_missing(last) ? all / kMoreBands : all;
-  Growth growth = within(most);
-  if (promise_.target_error) {
-    const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
-    if (const Growth wanted = towards(aim); cost(wanted) < most) growth = wanted;
-  }
-  constexpr double kIdle = 0.9;  // of the squared error: what is left open does not lower it
-  const bool idle = cost(growth) < 1.05 || (fixed_knob() != nullptr && predicted(growth) > kIdle * predicted({}));
-  if (idle && !bands_missing(last)) {
+  const double all = most_growth(affordable);
+  Growth growth = wanted(bands_missing(last) ? all / kMoreBands : all);
+  if (idle(growth) && !bands_missing(last)) {
     if (const char* knob = fixed_knob()) {
       return end(promise_.target_error ? Ending::floor : Ending::time_spent,
                  "reached " + percent(all_.back().high) + "; what is left comes from what the recipe fixes: " + knob);
     }
-    growth = {kLeastGrowth, kLeastGrowth, free_points() ? kLeastGrowth : 1, kLeastGrowth};
+    growth = least_growth();
   }
   return grown(last, growth, scene);
+}
+
+Ahead Passes::ahead(const Plan& last, const Scene& scene) const {
+  Passes to_come = *this;
+  Ahead out{.relrmse = all_.back().relrmse, .plan = last};
+  while (const std::optional<Plan> next = to_come.next(out.plan, scene)) {
+    PassRecord pass = to_come.growth().imagined(to_come.chosen_);
+    if (next->order != out.plan.order) pass = with_more_bands(pass);
+    const bool same = pass.relrmse == out.relrmse && next->order == out.plan.order;
+    if (out.passes == 0) out.next_seconds = pass.seconds;
+    out.seconds += pass.seconds;
+    out.rays += pass.rays;
+    out.relrmse = pass.relrmse;
+    out.plan = *next;
+    ++out.passes;
+    to_come.add(pass);
+    if (same) break;  // what such a pass finds cannot be told
+  }
+  out.outlook = to_come.outlook();
+  return out;
 }
 
 Plan Passes::resume(const std::vector<PassRecord>& known, Plan plan, const Scene& scene) {

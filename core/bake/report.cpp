@@ -433,15 +433,19 @@ ordered_json links_pass_list(const Passes& passes) {
   return list;
 }
 
+const char* name_of(Outlook::Ending ending) {
+  constexpr const char* kEndings[] = {"target_met", "time_spent", "floor"};
+  return kEndings[static_cast<int>(ending)];
+}
+
 ordered_json promise_object(const ReportInput& in) {
   const Promise& promise = in.recipe.promise;
   const Passes& passes = in.passes;
-  constexpr const char* kEndings[] = {"target_met", "time_spent", "floor"};
   ordered_json out;
   if (promise.target_error) out["target_error"] = *promise.target_error;
   if (promise.time_budget_s) out["time_budget_s"] = *promise.time_budget_s;
   out["kept"] = passes.kept();
-  out["ended_by"] = kEndings[static_cast<int>(passes.outlook().ending)];
+  out["ended_by"] = name_of(passes.outlook().ending);
   out["reason"] = passes.outlook().reason;
   out["passes"] = in.field ? field_pass_list(passes) : in.links ? links_pass_list(passes) : pass_list(passes, in.plan);
   return out;
@@ -480,11 +484,23 @@ std::string report_json(const ReportInput& in) {
   return text_of(out);
 }
 
-std::string plan_report_json(const Plan& plan, const Scene& scene, const Promise& promise) {
-  ordered_json prediction = prediction_object(plan.prediction);
-  prediction["of"] = promise.time_budget_s ? "the time budget" : promise ? "the first pass" : "the bake";
-  if (promise.time_budget_s)
-    prediction["seconds"] = std::max(*promise.time_budget_s, plan.prediction.seconds);  // one pass there is in any case
+std::string plan_report_json(const Plan& plan, const Scene& scene, const Promise& promise,
+                             const std::optional<Ahead>& ahead) {
+  ordered_json prediction = prediction_object(ahead ? ahead->plan.prediction : plan.prediction);
+  prediction["of"] = ahead                   ? "the promise"
+                     : promise.time_budget_s ? "the time budget"
+                     : promise               ? "the first pass"
+                                             : "the bake";
+  if (ahead) {
+    prediction["seconds"] = ahead->seconds;
+    prediction["rays"] = ahead->rays;
+    prediction["passes"] = ahead->passes;
+    prediction["relrmse"] = ahead->relrmse;
+    prediction["ended_by"] = name_of(ahead->outlook.ending);
+    prediction["reason"] = ahead->outlook.reason;
+  } else if (promise.time_budget_s) {  // one pass there is in any case
+    prediction["seconds"] = std::max(*promise.time_budget_s, plan.prediction.seconds);
+  }
   return text_of({{"plan", plan_list(plan)},
                   {"parameters", parameters_object(plan)},
                   {"prediction", prediction},

@@ -58,7 +58,7 @@ struct ReportInput {
 
 std::string report_json(const ReportInput&);
 
-/// The plan alone, for POST /v1/plan and `kiln plan`.
-std::string plan_report_json(const Plan&, const Scene&, const Promise&);
+/// The plan alone, for POST /v1/plan and `kiln plan`; with what is ahead of a promise where a trial told it.
+std::string plan_report_json(const Plan&, const Scene&, const Promise&, const std::optional<Ahead>&);
 
 }  // namespace kiln

@@ -21,8 +21,8 @@ struct Spending {
   int samples = 256;
 };
 
-/// `pilot` is of kPilotSamples paths at each point. About 5 % of `bake_rays`, or more: about a second where a promise
-/// hangs on it (`thorough`), else a tenth of one.
+/// `pilot` is of kPilotSamples paths at each point. About 5 % of `bake_rays`, or more: about a second where an error
+/// target hangs on it (`thorough`), else a tenth of one.
 Spending plan_spending(const ErrorStats& pilot, double rays_per_path, std::uint64_t bake_rays, bool thorough);
 
 }  // namespace kiln

@@ -278,7 +278,8 @@ void add_recipes(std::vector<Endpoint>& all) {
                  "/v1/plan",
                  "planJob",
                  "recipes",
-                 "What a bake would do and skip, and why, with predicted seconds, memory and bytes; nothing is baked",
+                 "What a bake would do and skip, and why, with predicted seconds, memory and bytes; no result is kept "
+                 "(of an error target the first pass is baked for a trial)",
                  {"preset", "label", "environment", "quality", "seed", "force", "sceneName"},
                  job_bodies(),
                  200,

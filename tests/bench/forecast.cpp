@@ -1,5 +1,6 @@
 // How far the plan's predictions are off. Bakes scenes under the clear sky, each in a process of its own.
 //   kiln_forecast [--quality draft|standard|final] [SCENE.glb ...]     the two demo scenes when none is named
+//   kiln_forecast --target E [SCENE.glb ...]     of the promise of that error at order 6: all of its passes
 // One JSON line a bake, predicted / measured of each figure, then the share of bakes within a factor 1.5. Asserts
 // nothing.
 
@@ -9,6 +10,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,14 +34,29 @@ Result<SceneFiles> read(const std::string& scene) {
   return std::move(*files);
 }
 
-Result<std::string> report_of(const std::string& scene, const std::string& quality) {
+/// A promise, or a quality.
+ordered_json recipe_of(const std::string& quality, const std::optional<double>& target) {
+  ordered_json out = {{"environment", {{"builtin", "clear"}}}};
+  if (!target) return out.update({{"quality", quality}}), out;
+  out["steps"] = {{{"do", "prt"}, {"order", 6}}};
+  out["quality"] = {{"target_error", *target}};
+  return out;
+}
+
+/// The report of a bake; of a promise with the prediction of its plan in place of that of its last pass.
+Result<std::string> report_of(const std::string& scene, const ordered_json& recipe) {
   KILN_TRY(files, read(scene));
-  const ordered_json recipe = {{"environment", {{"builtin", "clear"}}}, {"quality", quality}};
   const BakeInput input{files, *parse_recipe(recipe.dump()), {}, {}};
   Threads threads;
   KILN_TRY(output, bake(input, {}, threads));
   for (const auto& file : output.files) {
-    if (file.name == "report.json") return std::string(file.bytes.begin(), file.bytes.end());
+    if (file.name != "report.json") continue;
+    ordered_json report = ordered_json::parse(file.bytes.begin(), file.bytes.end());
+    if (input.recipe.promise) {
+      KILN_TRY(plan, plan_json(input, threads));
+      report["prediction"] = ordered_json::parse(plan)["prediction"];
+    }
+    return report.dump();
   }
   return fault("no_report", "the bake gave no report");
 }
@@ -57,11 +74,16 @@ ordered_json ratios(const ordered_json& report) {
 
 int run(int count, char** words) {
   std::string quality = "standard";
+  std::optional<double> target;
   std::vector<std::string> scenes;
   for (int i = 1; i < count; ++i) {
     const std::string word = words[i];
     if (word == "--quality" && i + 1 < count) {
       quality = words[++i];
+      continue;
+    }
+    if (word == "--target" && i + 1 < count) {
+      target = std::stod(words[++i]);
       continue;
     }
     scenes.push_back(word);
@@ -71,13 +93,20 @@ int run(int count, char** words) {
   int bakes = 0;
   for (const std::string& scene : scenes) {
     const std::string name = std::filesystem::path(scene).stem().string();
-    const auto text = trade::in_child([&] { return report_of(scene, quality); });
+    const auto text = trade::in_child([&] { return report_of(scene, recipe_of(quality, target)); });
     if (!text) {
       std::printf("%s\n", ordered_json{{"scene", name}, {"fault", text.error().code}}.dump().c_str());
       continue;
     }
     const ordered_json report = ordered_json::parse(*text), off = ratios(report);
-    ordered_json line = {{"scene", name}, {"quality", quality}, {"measured_seconds", report["seconds"]}};
+    ordered_json line = {{"scene", name}, {"measured_seconds", report["seconds"]}};
+    if (target) {
+      line["target"] = *target;
+      line["passes"] = {report["prediction"]["passes"], report["promise"]["passes"].size()};
+      line["ended_by"] = {report["prediction"]["ended_by"], report["promise"]["ended_by"]};
+    } else {
+      line["quality"] = quality;
+    }
     line.update(off);
     std::printf("%s\n", line.dump().c_str());
     std::fflush(stdout);

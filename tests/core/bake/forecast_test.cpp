@@ -63,8 +63,27 @@ TEST(ForecastOf, APromiseSaysWhatItsFigureIsFor) {
   const json budget = plan_of("room", R"({"quality":{"time_budget_s":30}})");
   EXPECT_EQ(budget["prediction"]["of"], "the time budget");
   EXPECT_EQ(budget["prediction"]["seconds"], 30);
-  EXPECT_EQ(plan_of("room", R"({"quality":{"target_error":0.05}})")["prediction"]["of"], "the first pass");
   EXPECT_EQ(plan_of("room", "{}")["prediction"]["of"], "the bake");
+}
+
+TEST(ForecastOf, ATargetIsToldPassByPass) {
+  const std::string recipe = R"({"steps":[{"do":"prt","order":4}],"quality":{"target_error":0.04}})";
+  Threads threads;
+  const json plan = plan_of("column", recipe)["prediction"];
+  const json report = report_of(*bake(input_of("column", recipe), {}, threads));
+  EXPECT_EQ(plan["of"], "the promise");
+  EXPECT_EQ(plan["ended_by"], report["promise"]["ended_by"]);
+  ASSERT_GT(report["promise"]["passes"].size(), 1);
+  EXPECT_EQ(plan["passes"], report["promise"]["passes"].size());
+  expect_within(plan["triangles"], report["result"]["triangles"], kGoal, "triangles");
+  expect_within(plan["rays"], report["rays"], kGoal, "rays");
+}
+
+TEST(ForecastOf, AFloorIsSeenBeforehand) {
+  const json plan = plan_of("column", R"({"steps":[{"do":"prt","order":4,"subdivide":"off"}],
+                                          "quality":{"target_error":0.01}})")["prediction"];
+  EXPECT_EQ(plan["ended_by"], "floor");
+  EXPECT_NE(plan["reason"].get<std::string>().find("/steps/0/subdivide"), std::string::npos) << plan["reason"];
 }
 
 }  // namespace
