@@ -197,7 +197,7 @@ struct NextPass {
 
 std::optional<Ending> ending_of(const Recipe& recipe, const Grid& grid, const GridPass& last, const NextPass& next,
                                 double seconds) {
-  constexpr double kBytesAVertex = 1500;  // while it is fitted, written and read back; measured by kiln_grid_where
+  constexpr double kBytesAVertex = 1500;  // values, corners, fit, file; counted from their sizes, not measured
   const Promise& promise = recipe.promise;
   const std::string reached = "the grid of " + text_of(grid) + " has an error of at most " + percent(last.high);
   if (promise.target_error && last.high <= *promise.target_error) return Ending{true, "target_met", reached};
@@ -278,7 +278,7 @@ Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& lo
     const Promise& promise = task.recipe.promise;
     if (!promise) break;
     log.begin("where the grid is wrong", next.share + 0.03);
-    const double error = std::min(promise.target_error.value_or(0), 0.5 * pass.relrmse);
+    const double error = std::min(promise.target_error.value_or(1), 0.5 * pass.relrmse);
     next.wanted = find_bricks(task.world, params, {.error = std::max(error, 0.005)}, baked.grid, threads);
     log.count_rays(next.wanted.rays);
     next.anew = next.wanted.fresh == 0;
