@@ -115,8 +115,9 @@ void run(const Scene& scene, const GridBake& asked, int longest, int passes, std
 int main(int argc, char** argv) {
   using namespace kiln;
   const auto number = [&](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
-  auto scene = argc > 1 ? testing::load_scene(KILN_SHARED, argv[1]) : std::nullopt;
-  if (!scene) return std::fprintf(stderr, "kiln_grid_bricks SCENE, a path below shared/models\n"), 1;
-  scene->lights.clear();
-  bench::run(*scene, {.rays = number(3, 256)}, number(2, 64), number(4, 2), static_cast<std::uint64_t>(number(5, 0)));
+  const auto loaded = testing::load_scene(KILN_SHARED, argc > 1 ? argv[1] : "");
+  if (!loaded) return std::fprintf(stderr, "kiln_grid_bricks SCENE, a path below shared/models\n"), 1;
+  Scene scene = *loaded;
+  scene.lights.clear();
+  bench::run(scene, {.rays = number(3, 256)}, number(2, 64), number(4, 2), static_cast<std::uint64_t>(number(5, 0)));
 }
