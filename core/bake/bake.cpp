@@ -116,20 +116,32 @@ Result<Pass> bake_passes(const BakeInput& input, CarriedScene in, const std::opt
   return std::move(*newest);
 }
 
-/// What a promise will take: its first pass is baked for a trial and thrown away, since only that tells.
-Result<Ahead> foresee(const BakeInput& input, CarriedScene in, const std::optional<Environment>& light,
-                      const Plan& first, Threads& threads) {
+/// What a promise will take: its first pass is baked for a trial and thrown away, since only that tells. Nothing where
+/// it takes too long: somebody waits for the plan.
+Result<std::optional<Ahead>> foresee(const BakeInput& input, CarriedScene in, const std::optional<Environment>& light,
+                                     const Plan& first, Threads& threads) {
+  constexpr double kLongestTrial = 25;
   const Mesh surface = in.scene.mesh;
   BakeLog log({});
-  KILN_TRY(pass, bake_pass(input, in, light, first, log, threads));
+  Result<Pass> pass;
+  threads.stop_after(kLongestTrial);
+  try {
+    pass = bake_pass(input, in, light, first, log, threads);
+  } catch (const Cancelled&) {
+    threads.forever();
+    threads.check();
+    return std::optional<Ahead>();
+  }
+  threads.forever();
+  if (!pass) return tl::make_unexpected(pass.error());
   in.scene.mesh = surface;
   Passes passes(input.recipe.promise, fixed_knobs(input.recipe), input.recipe.limits, passes_of(input.recipe));
-  passes.add(record_of(pass, log.seconds(), log.rays(), log.seconds()));
-  Ahead out = passes.ahead(pass.plan, in.scene);
+  passes.add(record_of(*pass, log.seconds(), log.rays(), log.seconds()));
+  Ahead out = passes.ahead(pass->plan, in.scene);
   out.seconds += log.seconds();
   out.rays += log.rays();
   ++out.passes;
-  return out;
+  return std::optional(std::move(out));
 }
 
 }  // namespace

@@ -46,4 +46,8 @@ void Threads::for_blocks(std::size_t items, std::size_t block,
 
 void Threads::run(const std::function<void()>& body) { arena_->arena.execute(body); }
 
+void Threads::stop_after(double seconds) noexcept {
+  end_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
 }  // namespace kiln

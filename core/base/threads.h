@@ -2,6 +2,7 @@
 // The only place where threads are made. Work is cut into fixed blocks, so results never depend on their number.
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <exception>
 #include <functional>
@@ -9,7 +10,8 @@
 
 namespace kiln {
 
-/// Thrown by Threads::check and for_blocks once stop() was called; caught in run_job, the HTTP wrapper and main.
+/// Thrown by Threads::check and for_blocks once stop() was called or its time has come; caught in run_job, the HTTP
+/// wrapper and main.
 struct Cancelled : std::exception {
   const char* what() const noexcept override { return "cancelled"; }
 };
@@ -40,16 +42,27 @@ class Threads {
 
   /// Safe from any thread and from a signal handler.
   void stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
-  bool stopping() const noexcept { return stopping_.load(std::memory_order_relaxed); }
+  bool stopping() const noexcept { return stopping_.load(std::memory_order_relaxed) || late(); }
+  /// As stop(), but not before so many seconds from now; taken back by forever().
+  void stop_after(double seconds) noexcept;
+  void forever() noexcept { end_ = kNever; }
   void check() const {
     if (stopping()) throw Cancelled();
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr Clock::time_point kNever = Clock::time_point::max();
+  bool late() const noexcept {
+    const Clock::time_point end = end_.load(std::memory_order_relaxed);
+    return end != kNever && Clock::now() >= end;
+  }
+
   struct Arena;
   std::unique_ptr<Arena> arena_;
   LoopShares* shares_ = nullptr;
   std::atomic<bool> stopping_{false};
+  std::atomic<Clock::time_point> end_{kNever};
 };
 
 }  // namespace kiln

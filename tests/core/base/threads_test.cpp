@@ -60,6 +60,19 @@ TEST(Threads, StopEndsTheLoopWithCancelled) {
   EXPECT_THROW(threads.for_blocks(1, 1, [](std::size_t, std::size_t) {}), Cancelled);
 }
 
+TEST(Threads, TimeThatIsUpStopsLoopsUntilItIsTakenBack) {
+  Threads threads(2);
+  threads.stop_after(3600);
+  EXPECT_NO_THROW(threads.check());
+  threads.stop_after(0);
+  EXPECT_THROW(threads.for_blocks(1000, 1, [](std::size_t, std::size_t) {}), Cancelled);
+  threads.forever();
+  EXPECT_NO_THROW(threads.check());
+  threads.stop();
+  threads.forever();
+  EXPECT_THROW(threads.check(), Cancelled);  // who was asked to stop still stops
+}
+
 TEST(Threads, WhatABodyThrowsArrivesAtTheCaller) {
   Threads threads(2);
   EXPECT_THROW(threads.for_blocks(100, 1,
