@@ -244,8 +244,8 @@ Result<Lattice> read_bricks(const GridFile& file, const std::string& prefix, con
     const float* pixel = part->pixels.data() + i * static_cast<std::size_t>(part->channels);
     if (pixel[2] == 0) continue;
     const auto number = static_cast<int>(blocks.size());
-    if (pixel[2] != 1 || pixel[0] != static_cast<float>(number % kNumberBase) ||
-        pixel[1] != static_cast<float>(number / kNumberBase))
+    const int low = number % kNumberBase, high = number / kNumberBase;
+    if (pixel[2] != 1 || pixel[0] != static_cast<float>(low) || pixel[1] != static_cast<float>(high))
       return fault("grid_invalid", what + " must number its bricks in their order.", file.name);
     blocks.push_back(static_cast<std::uint32_t>(i));
   }

@@ -189,15 +189,14 @@ struct Ending {
   std::string ended_by, reason;
 };
 
-/// The next pass: how many vertices it bakes and how many there are then, and why there is none beyond it.
+/// The next pass: how many vertices it bakes, the bytes that takes, and whether there is none beyond the last.
 struct NextPass {
-  double baked = 0, all = 0;
+  double baked = 0, memory = 0;
   bool finest = false;
 };
 
 std::optional<Ending> ending_of(const Recipe& recipe, const Grid& grid, const GridPass& last, const NextPass& next,
                                 double seconds) {
-  constexpr double kBytesAVertex = 1500;  // values, corners, fit, file; counted from their sizes, not measured
   const Promise& promise = recipe.promise;
   const std::string reached = "the grid of " + text_of(grid) + " has an error of at most " + percent(last.high);
   if (promise.target_error && last.high <= *promise.target_error) return Ending{true, "target_met", reached};
@@ -208,22 +207,26 @@ std::optional<Ending> ending_of(const Recipe& recipe, const Grid& grid, const Gr
   if (then > recipe.limits.wall_s)
     return Ending{kept, "floor", reached + "; the next finer one would not fit limits.wall_s"};
   if (next.finest) return Ending{kept, "floor", reached + "; finer ones, or of more rays, are not baked"};
-  if (kBytesAVertex * next.all > static_cast<double>(recipe.limits.memory_mb << 20))
+  if (next.memory > static_cast<double>(recipe.limits.memory_mb << 20))
     return Ending{kept, "floor", reached + "; the next finer one would not fit limits.memory_mb"};
   return std::nullopt;
 }
 
-NextPass look_ahead(const PassOf& next, const Grid& grid, int rays) {
-  const auto all = static_cast<double>(counts_of(grid).vertices);
-  if (next.anew) return {.baked = 2 * all, .all = all, .finest = 2 * rays > kMostRays};
-  double now = 0, then = 0;
+/// `planned`: bytes of the bake without bricks.
+NextPass look_ahead(const PassOf& next, const Grid& grid, int rays, double planned) {
+  constexpr double kBytesAVertex = 1500;  // values, corners, fit, file; counted from their sizes, not measured
+  constexpr double kShared = 100;         // vertices that a brick has alone: some of its 125 are its neighbours' too
+  const auto base = static_cast<double>(grid.lattice.vertices()), all = static_cast<double>(counts_of(grid).vertices);
+  double baked = 0, fresh = 0;
   for (std::size_t k = 0; k < next.wanted.blocks.size(); ++k) {
     const std::size_t before = k < grid.finer.size() ? grid.finer[k].lattice.bricks.block.size() : 0;
     const std::size_t after = next.wanted.blocks[k].size();
-    if (after != before) then += static_cast<double>(after), now += static_cast<double>(before);
+    if (after == before) continue;
+    baked += kShared * static_cast<double>(after), fresh += kShared * static_cast<double>(after - before);
   }
-  constexpr double kShared = 100;  // vertices that a brick has alone: some of its 125 are its neighbours' too
-  return {.baked = kShared * then, .all = all + kShared * (then - now), .finest = false};
+  const double memory = planned + kBytesAVertex * (all + fresh - base);
+  if (next.anew) return {.baked = 2 * all, .memory = memory, .finest = 2 * rays > kMostRays};
+  return {.baked = baked, .memory = memory};
 }
 
 }  // namespace
@@ -271,6 +274,7 @@ Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& lo
   GridBake params = *plan.grid;
   params.seed = task.recipe.seed;
   params.progress = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
+  const auto planned = static_cast<double>(plan.prediction.memory_bytes);
   PassOf next{.params = params, .wanted = {}, .anew = true, .share = 0.6};
   for (;;) {
     KILN_TRY(pass, bake_once(task, next, baked, out, log, threads));
@@ -282,7 +286,7 @@ Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& lo
     next.wanted = find_bricks(task.world, params, {.error = std::max(error, 0.005)}, baked.grid, threads);
     log.count_rays(next.wanted.rays);
     next.anew = next.wanted.fresh == 0;
-    const NextPass then = look_ahead(next, baked.grid, params.rays);
+    const NextPass then = look_ahead(next, baked.grid, params.rays, planned);
     if (const auto ending = ending_of(task.recipe, baked.grid, pass, then, log.seconds())) {
       out.kept = ending->kept, out.ended_by = ending->ended_by, out.reason = ending->reason;
       break;
