@@ -175,6 +175,7 @@ std::optional<Plan> Passes::grown(const Plan& last, Growth growth, const Scene& 
                       std::sqrt(growth.triangles)};
     const bool points = plan.radiosity && !plan.field;
     if (points && this->growth().cost(half) > kLeastGrowth) return grown(last, half, scene);
+    if (const auto rays = more_rays_alone(); growth.triangles > 1 && rays) return grown(last, *rays, scene);
     return end(Ending::floor, "reached " + percent(all_.back().high) + "; " +
                                   (points ? "finer points, more rays or " : "") +
                                   "more triangles would need more than /limits/memory_mb");
@@ -235,13 +236,13 @@ double Passes::most_growth(double affordable) const {
 }
 
 /// The interval ends above the error: aims so that its end meets the target.
-Growth Passes::wanted(double most) const {
+Growth Passes::wanted(const PassGrowth& model, double most) const {
   const PassRecord& now = all_.back();
   if (promise_.target_error) {
     const double aim = *promise_.target_error * std::clamp(0.9 * now.relrmse / std::max(now.high, 1e-9), 0.3, 0.75);
-    if (const Growth enough = growth().towards(aim); growth().cost(enough) < most) return enough;
+    if (const Growth enough = model.towards(aim); model.cost(enough) < most) return enough;
   }
-  return growth().within(most);
+  return model.within(most);
 }
 
 /// What is left open does not lower the error.
@@ -250,6 +251,16 @@ bool Passes::idle(const Growth& growth) const {
   const PassGrowth model = this->growth();
   return model.cost(growth) < 1.05 ||
          (fixed_knob() != nullptr && model.predicted(growth) > kSame * model.predicted({}));
+}
+
+/// On the same triangles, if that helps.
+std::optional<Growth> Passes::more_rays_alone() const {
+  constexpr double kHelps = 0.9;  // of the squared error
+  FixedKnobs fixed = fixed_;
+  fixed.triangles = fixed.points = true;
+  const PassGrowth model(all_, kind_, fixed);
+  const Growth out = wanted(model, most_growth(time_growth()));
+  return model.predicted(out) < kHelps * model.predicted({}) ? std::optional(out) : std::nullopt;
 }
 
 Growth Passes::least_growth() const {
@@ -292,7 +303,7 @@ std::optional<Plan> Passes::next(const Plan& last, const Scene& scene) {
   }
 
   const double all = most_growth(affordable);
-  Growth growth = wanted(bands_missing(last) ? all / kMoreBands : all);
+  Growth growth = wanted(this->growth(), bands_missing(last) ? all / kMoreBands : all);
   if (idle(growth) && !bands_missing(last)) {
     if (const char* knob = fixed_knob()) {
       return end(promise_.target_error ? Ending::floor : Ending::time_spent,

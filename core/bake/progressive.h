@@ -64,7 +64,8 @@ class Passes {
   double time_growth() const;
   PassGrowth growth() const { return {all_, kind_, fixed_}; }
   double most_growth(double affordable) const;
-  Growth wanted(double most) const;
+  Growth wanted(const PassGrowth&, double most) const;
+  std::optional<Growth> more_rays_alone() const;
   Growth least_growth() const;
   bool idle(const Growth&) const;
   bool no_order_suffices() const;

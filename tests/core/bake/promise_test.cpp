@@ -209,6 +209,22 @@ TEST(Promise, WhereNoOrderSufficesTransportIsNotBoughtInVain) {
   EXPECT_NE(passes.outlook().reason.find("no order up to 10 suffices"), std::string::npos) << passes.outlook().reason;
 }
 
+/// Six million bytes more are allowed than an empty scene takes: triangles cannot grow, and the noise is enough.
+TEST(Promise, WhereMemoryAllowsNoMoreTrianglesMoreRaysMayDo) {
+  Passes passes({.target_error = 0.02}, {.order = true}, {.memory_mb = 30});
+  passes.add(pass_with({.noise = 0.03, .interpolation = 0.012}));
+  Plan plan;
+  plan.samples = plan.bounce_samples = 64;
+  plan.subdivide.triangles = 10'000;
+  const auto next = passes.next(plan, Scene{});
+  ASSERT_TRUE(next) << passes.outlook().reason;
+  EXPECT_EQ(next->subdivide.triangles, 10'000U);
+  EXPECT_GT(next->samples, 128);
+  passes.add(pass_with({.noise = 0.002, .interpolation = 0.03}));
+  EXPECT_FALSE(passes.next(plan, Scene{}));
+  EXPECT_NE(passes.outlook().reason.find("/limits/memory_mb"), std::string::npos) << passes.outlook().reason;
+}
+
 /// Passes told before they are baked cost and reach what the growths they choose say of them.
 TEST(Promise, WhatIsAheadReachesTheTarget) {
   Passes passes({.target_error = 0.01}, {.order = true}, {});
