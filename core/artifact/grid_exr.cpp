@@ -12,6 +12,7 @@ namespace kiln {
 namespace {
 
 constexpr const char* kVersion = "3";
+constexpr const char* kBeforeBricks = "2";  // read too: all that it holds means the same
 constexpr float kLeastHalf = 0x1p-24F;
 
 /// The parts of the corners that count, four bytes of a cell in each.
@@ -308,9 +309,10 @@ Result<Grid> read_grid_exr(std::span<const std::uint8_t> file, const std::string
   KILN_TRY(parts, read_exr_parts(file, name));
   const ExrPart& first = parts.front();
   const std::string blend = word_of(first, "kiln.blend"), content = word_of(first, "kiln.content");
-  if (word_of(first, "kiln.grid") != kVersion || (blend != "exact" && blend != "paper") ||
+  const std::string version = word_of(first, "kiln.grid");
+  if ((version != kVersion && version != kBeforeBricks) || (blend != "exact" && blend != "paper") ||
       (content != "indirect" && content != "all"))
-    return fault("grid_invalid", "The first part must have kiln.grid 3, kiln.blend and kiln.content.", name);
+    return fault("grid_invalid", "The first part must have kiln.grid 2 or 3, kiln.blend and kiln.content.", name);
   const auto scale = numbers_of<1>(first, "kiln.scale");
   if (!scale || !((*scale)[0] > 0)) return fault("grid_invalid", "kiln.scale must be a positive number.", name);
   KILN_TRY(lattice, lattice_of(first, name));

@@ -129,6 +129,21 @@ TEST(GridExr, SameBytesForTheSameGrid) {
   EXPECT_EQ(write_grid_exr(grid, kFrame, "{}"), write_grid_exr(grid, kFrame, "{}"));
 }
 
+TEST(GridExr, TheVersionBeforeBricksIsReadToo) {
+  const Grid grid = random_grid(GridBlend::exact, {4, 4, 4});
+  Bytes file = write_grid_exr(grid, kFrame, "{}");
+  const std::string name = "kiln.grid", word = std::string("string") + '\0' + '\1' + '\0' + '\0' + '\0' + '3';
+  const auto version = [&](char written) {
+    const auto at = std::ranges::search(file, name).begin();
+    const auto value = std::ranges::search(std::span(at, file.end()), word).begin() + std::ssize(word) - 1;
+    *value = static_cast<std::uint8_t>(written);
+    return read_grid_exr(file, "grid.exr");
+  };
+  const auto before = version('2');
+  ASSERT_TRUE(before) << before.error().message;
+  EXPECT_EQ(before->cells, grid.cells);
+}
+
 TEST(GridExr, CornersThatCannotBeAreRefusedWithTheirPart) {
   const auto fault_of = [](const CornerCut& cut) {
     Grid grid = random_grid(GridBlend::exact, {3, 2, 2});

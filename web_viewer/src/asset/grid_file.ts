@@ -64,7 +64,7 @@ export function readGrid(file: ArrayBuffer): GridFile {
       throw new Error(`grid.exr: ${name} is not three numbers`);
     return numbers as unknown as Triple;
   };
-  if (text('kiln.grid') !== '3') throw new Error('grid.exr: kiln.grid is not 3');
+  if (!['2', '3'].includes(text('kiln.grid'))) throw new Error('grid.exr: kiln.grid is neither 2 nor 3');
   const blend = text('kiln.blend') === 'paper' ? 'paper' : 'exact';
   const size = triple('kiln.size');
   const names = blend === 'exact' ? kExact : kPaper;
