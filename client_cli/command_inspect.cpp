@@ -119,8 +119,7 @@ json grid_facts(const Grid& grid) {
           {"spacing", {spacing.x, spacing.y, spacing.z}},
           {"blend", grid.blend == GridBlend::exact ? "exact" : "paper"},
           {"content", grid.content == GridContent::indirect ? "indirect" : "all"},
-          {"corners", !grid.cells.empty()},
-          {"bricks", counts_of(grid).bricks}};
+          {"corners", !grid.cells.empty()}};
 }
 
 json facts_of_json(std::string_view text) {
@@ -156,7 +155,7 @@ Outcome<json> facts_of(const std::string& path) {
     KILN_TRY(grid, load_grid(path));
     facts["kind"] = "grid";
     facts["grid"] = grid_facts(grid);
-    facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) / static_cast<double>(counts_of(grid).vertices);
+    facts["bytes_per_vertex"] = static_cast<double>(bytes.size()) / static_cast<double>(grid.lattice.vertices());
     facts["certificate"] = certificate_beside(path, "/grid/certificate");
     return facts;
   } else {
@@ -205,9 +204,8 @@ std::string field_line(const json& facts) {
 
 std::string grid_text(const json& facts) {
   const json& grid = facts["grid"];
-  return line("grid", grid["size"].dump() + " vertices, " + grid["spacing"].dump() + " apart from " +
-                          grid["origin"].dump() +
-                          (grid["bricks"] == 0 ? "" : "; " + grid["bricks"].dump() + " finer bricks")) +
+  return line("grid",
+              grid["size"].dump() + " vertices, " + grid["spacing"].dump() + " apart from " + grid["origin"].dump()) +
          line("light", grid["content"].get<std::string>() + ", " + grid["blend"].get<std::string>() + " blend" +
                            (grid["corners"] == true ? ", corners that count" : "")) +
          line("certificate", facts["certificate"].is_object()

@@ -19,7 +19,7 @@ struct ExrPart {
 };
 
 struct ExrLimits {
-  std::size_t most_parts = 256;
+  std::size_t most_parts = 64;
   std::uint64_t most_pixels = std::uint64_t{1} << 28;  // of all parts together
 };
 

@@ -66,8 +66,7 @@ Result<LitResults> solve_light(const BakeInput& input, Scene& scene, const Envir
   hooks.lit = [&](const Tracer& tracer, const LitSurface* surface, const Mesh& mesh, std::span<const Vec3f> value) {
     const GatherFaces faces(tracer.scene());
     const IncidentLight::World world{tracer, faces, surface, sky};
-    if (plan.grid)
-      outcome = bake_grid_step({world, input.recipe, provenance(input), plan.radiosity->bounces}, plan, log, threads);
+    if (plan.grid) outcome = bake_grid_step({world, input.recipe, provenance(input)}, plan, log, threads);
     if (plan.field) {
       log.begin("light field", 0.88);
       Scene refined = tracer.scene();

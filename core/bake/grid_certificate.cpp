@@ -132,12 +132,8 @@ GridCertificate certify_grid(const GridCheck& check, Threads& threads) {
   out.error = compute_error({values, truth.value, truth.noise, points.size()}, {.seed = seed});
   if (out.mean_light > 0) {
     Grid written = check.baked.grid;
-    const auto into_world = [&](Lattice& lattice) {
-      lattice.origin = frame.to_world(lattice.origin);
-      lattice.spacing = lattice.spacing * frame.scale;
-    };
-    into_world(written.lattice);
-    for (Grid& finer : written.finer) into_world(finer.lattice);
+    written.lattice.origin = frame.to_world(written.lattice.origin);
+    written.lattice.spacing = written.lattice.spacing * frame.scale;
     out.sources.storage = std::sqrt(mean_square(values, values_at(written, frame, points))) / out.mean_light;
     out.sources.noise = std::sqrt(kInterpolated * vertex_variance(check, seed, threads)) / out.mean_light;
     const double known_squares = std::pow(out.sources.noise, 2) + std::pow(out.sources.storage, 2);

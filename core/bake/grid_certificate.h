@@ -3,8 +3,8 @@
 // path-traced reference of the same light (reflected light alone where the grid holds that).
 //
 // Points   area-uniform, on the side of the vertex normals; those inside solids, which nobody sees, are left out
-// Sources  of the error: noise of the gathering rays (two draws at some vertices of the base, less what interpolation
-//          takes off it),
+// Sources  of the error: noise of the gathering rays (two draws at some vertices, less what interpolation takes off
+// it),
 //          storage (the file against what was written to it), and what is left: distance between vertices, corners that
 //          count, and the blend. They are squares that sum to the relRMSE, unless the estimates alone exceed it.
 // Repeat   same numbers for any thread count.   Never changes the grid

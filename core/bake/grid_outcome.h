@@ -14,7 +14,6 @@ namespace kiln {
 
 struct GridPass {
   std::array<int, 3> size{};
-  std::size_t vertices = 0, bricks = 0;  // of all lattices
   std::uint64_t rays = 0;
   double seconds = 0;
   double relrmse = 0, low = 0, high = 0;  // of the certificate, where there is one

@@ -6,7 +6,6 @@
 
 #include "core/artifact/grid_exr.h"
 #include "core/bake/radiosity_step.h"
-#include "core/grid/refine.h"
 #include "core/grid/surface_gather.h"
 #include "core/prt/ray_origin.h"
 #include "core/sphere/sampling.h"
@@ -129,49 +128,25 @@ void add_prediction(Prediction& out, const GridBake& bake, double price) {
   out.artifact_bytes += whole(6000 + vertices * (1.75 * numbers + 2));
 }
 
-std::string text_of(const Grid& grid) {
-  const GridCounts n = counts_of(grid);
-  if (n.bricks == 0) return text_of(grid.lattice.size) + " vertices";
-  return text_of(grid.lattice.size) + " vertices and " + std::to_string(n.bricks) + " bricks";
-}
-
-/// What one pass does.
-struct PassOf {
-  const GridBake& params;
-  BricksWanted wanted;  // beyond the base
-  bool anew = false;    // else what the pass before baked is kept
-  double share = 0;     // of the bake's progress, at its beginning
-};
-
 /// One grid: gathered, written, read back, certified. Replaces what `out` holds of the one before.
-Result<GridPass> bake_once(const GridTask& task, const PassOf& asked, BakedGrid& baked, GridOutcome& out, BakeLog& log,
-                           Threads& threads) {
-  const GridBake& params = asked.params;
+Result<GridPass> bake_once(const GridTask& task, const GridBake& params, int bounces, double share, GridOutcome& out,
+                           BakeLog& log, Threads& threads) {
   const double before = log.seconds();
-  const std::uint64_t rays_before = baked.stats.rays;
-  log.begin("grid " + text_of(params.size), asked.share);
-  if (asked.anew) {
-    baked = bake_grid(task.world, params, threads);
-    baked.stats.rays += rays_before;
-  }
-  add_bricks(task.world, params, asked.wanted, baked, threads);
+  log.begin("grid " + text_of(params.size), share);
+  const BakedGrid baked = bake_grid(task.world, params, threads);
   out.file = write_grid_exr(baked.grid, task.world.tracer.scene().frame, task.provenance);
   KILN_TRY(decoded, read_grid_exr(out.file, "grid.exr"));
-  log.count_rays(baked.stats.rays - rays_before);
+  log.count_rays(baked.stats.rays);
   out.size = params.size;
   out.rays = params.rays;
   out.spacing = decoded.lattice.spacing;
   out.stats = baked.stats;
-  const GridCounts counts = counts_of(baked.grid);
-  GridPass pass{.size = params.size,
-                .vertices = counts.vertices,
-                .bricks = counts.bricks,
-                .rays = baked.stats.rays - rays_before};
+  GridPass pass{.size = params.size, .rays = baked.stats.rays};
   if (task.recipe.certificate) {
-    log.begin("grid certificate", asked.share + 0.02);
+    log.begin("grid certificate", share + 0.02);
     // A quick look tells that a target is far; what says that it is met has to be thorough.
     const auto certify = [&](bool thorough) {
-      out.certificate = certify_grid({decoded, baked, task.world, params, task.bounces, thorough}, threads);
+      out.certificate = certify_grid({decoded, baked, task.world, params, bounces, thorough}, threads);
     };
     certify(false);
     if (out.certificate->error.relrmse <= task.recipe.promise.target_error.value_or(0)) certify(true);
@@ -183,66 +158,42 @@ Result<GridPass> bake_once(const GridTask& task, const PassOf& asked, BakedGrid&
   return pass;
 }
 
-/// Why there is no further pass, or nothing where there is one.
+/// Why there is no further pass, or nothing where there is one. `seconds` is what the whole bake has taken so far.
 struct Ending {
   bool kept = false;
   std::string ended_by, reason;
 };
 
-/// The next pass: how many vertices it bakes, the bytes that takes, and whether there is none beyond the last.
-struct NextPass {
-  double baked = 0, memory = 0;
-  bool finest = false;
-};
-
-std::optional<Ending> ending_of(const Recipe& recipe, const Grid& grid, const GridPass& last, const NextPass& next,
-                                double seconds) {
+std::optional<Ending> ending_of(const Recipe& recipe, const GridPass& last, const std::array<int, 3>& next,
+                                std::uint64_t next_memory, double seconds) {
   const Promise& promise = recipe.promise;
-  const std::string reached = "the grid of " + text_of(grid) + " has an error of at most " + percent(last.high);
+  const std::string reached =
+      "the grid of " + text_of(last.size) + " vertices has an error of at most " + percent(last.high);
   if (promise.target_error && last.high <= *promise.target_error) return Ending{true, "target_met", reached};
-  const double then = seconds + last.seconds * next.baked / std::max<double>(1, static_cast<double>(last.vertices));
+  const double then = seconds + last.seconds * vertices_of(next) / vertices_of(last.size);
   if (promise.time_budget_s && then > *promise.time_budget_s)
     return Ending{true, "time_spent", reached + "; the next finer one would not fit the time"};
   const bool kept = !promise.target_error;
   if (then > recipe.limits.wall_s)
     return Ending{kept, "floor", reached + "; the next finer one would not fit limits.wall_s"};
-  if (next.finest) return Ending{kept, "floor", reached + "; finer ones, or of more rays, are not baked"};
-  if (next.memory > static_cast<double>(recipe.limits.memory_mb << 20))
+  if (*std::max_element(next.begin(), next.end()) > kMostLongest)
+    return Ending{kept, "floor", reached + "; finer ones are not baked"};
+  if (next_memory > recipe.limits.memory_mb << 20)
     return Ending{kept, "floor", reached + "; the next finer one would not fit limits.memory_mb"};
   return std::nullopt;
-}
-
-/// `planned`: bytes of the bake without bricks.
-NextPass look_ahead(const PassOf& next, const Grid& grid, int rays, double planned) {
-  constexpr double kBytesAVertex = 1500;  // values, corners, fit, file; counted from their sizes, not measured
-  constexpr double kShared = 100;         // vertices that a brick has alone: some of its 125 are its neighbours' too
-  const auto base = static_cast<double>(grid.lattice.vertices()), all = static_cast<double>(counts_of(grid).vertices);
-  double baked = 0, fresh = 0;
-  for (std::size_t k = 0; k < next.wanted.blocks.size(); ++k) {
-    const std::size_t before = k < grid.finer.size() ? grid.finer[k].lattice.bricks.block.size() : 0;
-    const std::size_t after = next.wanted.blocks[k].size();
-    if (after == before) continue;
-    baked += kShared * static_cast<double>(after), fresh += kShared * static_cast<double>(after - before);
-  }
-  const double memory = planned + kBytesAVertex * (all + fresh - base);
-  if (next.anew) return {.baked = 2 * all, .memory = memory, .finest = 2 * rays > kMostRays};
-  return {.baked = baked, .memory = memory};
 }
 
 }  // namespace
 
 Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment* sky, Threads& threads) {
   const GridStep& step = *recipe.grid;
-  // Of a promise bricks mend the lattice, but not the surface that rays look at: its points are a floor beneath it.
-  constexpr double kPointsOfPromises = 4;
-  RadiosityEffort surface = radiosity_effort(recipe.promise ? Quality::standard : recipe.quality);
-  if (recipe.promise) surface.points *= kPointsOfPromises;
-  Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, surface, sky, threads);
+  const Quality surface = recipe.promise ? Quality::standard : recipe.quality;
+  Plan plan = make_radiosity_plan(scene, {.bounces = step.bounces}, radiosity_effort(surface), sky, threads);
   const GridEffort effort = grid_effort(recipe);
   const Box box = box_of(scene.mesh);
   const Tracer tracer(scene, threads);
   const double reach = median_reach(tracer);
-  const int longest = longest_side(effort, reach);
+  const int longest = recipe.promise ? effort.longest : longest_side(effort, reach);
   plan.grid = GridBake{.size = step.resolution.value_or(even_size(box.low, box.high, longest)),
                        .blend = step.blend,
                        .content = step.content,
@@ -252,7 +203,7 @@ Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment*
   std::string reason = effort.reason + std::string(" has ") + std::to_string(effort.longest) +
                        " vertices along the side of a room; half of the rays that leave a surface end within " +
                        percent(reach) + " of the scene's longest side";
-  if (recipe.promise) reason += "; bricks are added until the promise is kept";
+  if (recipe.promise) reason = "the first pass; doubled until the promise is kept";
   decide(plan, "resolution", text_of(grid.size), step.resolution ? asked : reason);
   decide(plan, "content", step.content == GridContent::all ? "all" : "indirect",
          step.content == GridContent::all ? "lamps and sky are in the grid too"
@@ -270,36 +221,30 @@ Plan make_grid_plan(const Scene& scene, const Recipe& recipe, const Environment*
 
 Result<GridOutcome> bake_grid_step(const GridTask& task, Plan& plan, BakeLog& log, Threads& threads) {
   GridOutcome out;
-  BakedGrid baked;
+  const Box box = box_of(task.world.tracer.scene().mesh);
   GridBake params = *plan.grid;
   params.seed = task.recipe.seed;
   params.progress = [&](std::uint64_t done, std::uint64_t total) { log.advance(done, total); };
-  const auto planned = static_cast<double>(plan.prediction.memory_bytes);
-  PassOf next{.params = params, .wanted = {}, .anew = true, .share = 0.6};
-  for (;;) {
-    KILN_TRY(pass, bake_once(task, next, baked, out, log, threads));
+  double share = 0.6;
+  for (int longest = kFirstLongest;; longest *= 2) {
+    KILN_TRY(pass, bake_once(task, params, plan.radiosity->bounces, share, out, log, threads));
     out.passes.push_back(pass);
-    const Promise& promise = task.recipe.promise;
-    if (!promise) break;
-    log.begin("where the grid is wrong", next.share + 0.03);
-    const double error = std::min(promise.target_error.value_or(1), 0.5 * pass.relrmse);
-    next.wanted = find_bricks(task.world, params, {.error = std::max(error, 0.005)}, baked.grid, threads);
-    log.count_rays(next.wanted.rays);
-    next.anew = next.wanted.fresh == 0;
-    const NextPass then = look_ahead(next, baked.grid, params.rays, planned);
-    if (const auto ending = ending_of(task.recipe, baked.grid, pass, then, log.seconds())) {
+    if (!task.recipe.promise) break;
+    GridBake finer = params;
+    finer.size = even_size(box.low, box.high, 2 * longest);
+    Prediction more;
+    add_prediction(more, finer, 0);
+    if (const auto ending = ending_of(task.recipe, pass, finer.size, more.memory_bytes, log.seconds())) {
       out.kept = ending->kept, out.ended_by = ending->ended_by, out.reason = ending->reason;
       break;
     }
-    if (next.anew) params.rays *= 2;
-    next.share += 0.5 * (0.85 - next.share);
+    params = finer;
+    share += 0.5 * (0.85 - share);
   }
-  plan.grid->rays = params.rays;
+  plan.grid->size = params.size;
   decide(plan, "grid vertices",
          std::to_string(out.stats.invalid) + " inside solids, " + std::to_string(out.stats.moved) + " moved",
          "those inside are filled from their neighbours, those on a surface gather beside it");
-  if (out.passes.back().bricks > 0)
-    decide(plan, "grid bricks", std::to_string(out.passes.back().bricks), "where surfaces read the coarser grid wrong");
   return out;
 }
 

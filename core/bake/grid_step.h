@@ -2,9 +2,8 @@
 // The `grid` step: an irradiance vector grid of the scene's light (core/grid/bake_grid.h), beside the scene itself, lit
 // as by the step `radiosity`, whose points are what the grid's rays look at.
 //
-// Promise  the base is baked with as many vertices as a room's share of kFirstLongest; then bricks are added where
-//          surfaces read it wrong (core/grid/refine.h), and where none are wanted any more rays are doubled, until the
-//          upper end of its certificate's interval meets the target, or the next pass would not fit time or memory.
+// Promise  the grid is baked with kFirstLongest vertices along its longest side and doubled until the upper end of its
+//          certificate's interval meets the target, or the next one would not fit time, memory or kMostLongest.
 // Result   grid.exr. What its certificate judges is that file, read back.
 
 #include <string>
@@ -16,7 +15,7 @@
 
 namespace kiln {
 
-inline constexpr int kFirstLongest = 16, kMostRays = 4096;
+inline constexpr int kFirstLongest = 8, kMostLongest = 256;
 
 /// The plan of `radiosity` with the grid added: decisions, seconds, memory, bytes.
 Plan make_grid_plan(const Scene&, const Recipe&, const Environment* sky, Threads&);
@@ -26,7 +25,6 @@ struct GridTask {
   const SphereGather::World& world;
   const Recipe& recipe;
   std::string provenance;
-  int bounces = -1;  // of the surface that rays look at
 };
 
 /// Gathers, writes, reads back and certifies; where a promise was made, until it is kept or cannot be.

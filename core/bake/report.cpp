@@ -98,8 +98,6 @@ ordered_json grid_pass_list(const GridOutcome& grid) {
   ordered_json list = ordered_json::array();
   for (const GridPass& p : grid.passes) {
     list.push_back({{"size", p.size},
-                    {"vertices", p.vertices},
-                    {"bricks", p.bricks},
                     {"rays", p.rays},
                     {"seconds", p.seconds},
                     {"relrmse", p.relrmse},
@@ -111,8 +109,6 @@ ordered_json grid_pass_list(const GridOutcome& grid) {
 ordered_json grid_object(const GridOutcome& grid, const GridBake& params) {
   return {{"size", grid.size},
           {"spacing", {grid.spacing.x, grid.spacing.y, grid.spacing.z}},
-          {"vertices", grid.passes.back().vertices},
-          {"bricks", grid.passes.back().bricks},
           {"blend", params.blend == GridBlend::exact ? "exact" : "paper"},
           {"content", params.content == GridContent::indirect ? "indirect" : "all"},
           {"rays_per_vertex", grid.rays},

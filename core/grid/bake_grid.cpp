@@ -1,7 +1,6 @@
 #include "core/grid/bake_grid.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "core/base/expects.h"
 #include "core/base/shared_loop.h"
@@ -33,8 +32,7 @@ void each_neighbour(const Lattice& lattice, std::size_t vertex, const F& f) {
         const std::array<int, 3> at{x + dx, y + dy, z + dz};
         bool inside = dx != 0 || dy != 0 || dz != 0;
         for (std::size_t axis = 0; axis < 3; ++axis) inside = inside && at[axis] >= 0 && at[axis] < lattice.size[axis];
-        const std::size_t neighbour = inside ? lattice.index(at) : Lattice::kNone;
-        if (neighbour != Lattice::kNone) f(neighbour);
+        if (inside) f(lattice.index(at));
       }
     }
   }
@@ -103,17 +101,12 @@ std::vector<Vec3f> gather_places(const Lattice& lattice, const Scene& scene, Thr
 
 BakedGrid bake_grid(const SphereGather::World& world, const GridBake& params, Threads& threads) {
   const auto [nx, ny, nz] = params.size;
-  EXPECTS(nx >= 1 && ny >= 1 && nz >= 1);
-  const Box box = box_of(world.tracer.scene().mesh);
-  return bake_lattice(world, params, lattice_over(box.low, box.high, params.size), threads);
-}
-
-BakedGrid bake_lattice(const SphereGather::World& world, const GridBake& params, Lattice lattice, Threads& threads) {
-  EXPECTS(params.rays >= 1);
+  EXPECTS(nx >= 1 && ny >= 1 && nz >= 1 && params.rays >= 1);
   const Scene& scene = world.tracer.scene();
+  const Box box = box_of(scene.mesh);
   BakedGrid out;
   Grid& grid = out.grid;
-  grid.lattice = std::move(lattice);
+  grid.lattice = lattice_over(box.low, box.high, params.size);
   grid.blend = params.blend;
   grid.content = params.content;
   grid.parts.assign(part_count(params.blend), std::vector<Vec3f>(grid.lattice.vertices()));
@@ -152,9 +145,7 @@ BakedGrid bake_lattice(const SphereGather::World& world, const GridBake& params,
   if (params.corners) grid.cells = find_cell_corners(world.tracer, grid.lattice, places, out.stats.rays, threads);
   if (fits_surface(params)) {
     const SurfacePlaces surface{.rays = params.rays / 2, .seed = params.seed};
-    const std::vector<SurfacePlace> received = gather_surface(world, surface, grid, places, out.stats.rays, threads);
-    fit_to_surface(received, grid, threads);
-    set_shares(received, grid);
+    fit_to_surface(gather_surface(world, surface, grid, places, out.stats.rays, threads), grid, threads);
   }
   return out;
 }

@@ -54,8 +54,6 @@ inline constexpr float kBackShare = 0.15F;
 inline constexpr double kNearSurface = 0.05;
 
 BakedGrid bake_grid(const SphereGather::World&, const GridBake&, Threads&);
-/// The same at the vertices of a lattice over the scene's box, whole or in bricks, in place of params.size.
-BakedGrid bake_lattice(const SphereGather::World&, const GridBake&, Lattice, Threads&);
 
 /// Where each vertex of a lattice gathers, in the unit cube.
 std::vector<Vec3f> gather_places(const Lattice&, const Scene&, Threads&);

@@ -27,73 +27,25 @@ std::uint64_t points_on(double faces, double per_face) {
   return static_cast<std::uint64_t>(std::clamp(std::ceil(per_face * faces), 1.0, double{kMostPoints}));
 }
 
-struct CellRange {
-  std::array<int, 3> first, last;
-};
-
-/// The cells of the box of a triangle.
-CellRange cell_range(const Lattice& lattice, const Mesh& mesh, const Triangle& t) {
-  const Vec3d a = to_double(mesh.position[t[0]]), b = to_double(mesh.position[t[1]]),
-              c = to_double(mesh.position[t[2]]);
-  const Vec3d low{std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y}), std::min({a.z, b.z, c.z})};
-  const Vec3d high{std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y}), std::max({a.z, b.z, c.z})};
-  return {place_in(lattice, low).cell, place_in(lattice, high).cell};
-}
-
-template <class F>
-void each_in(const CellRange& range, const F& f) {
-  for (int z = range.first[2]; z <= range.last[2]; ++z) {
-    for (int y = range.first[1]; y <= range.last[1]; ++y) {
-      for (int x = range.first[0]; x <= range.last[0]; ++x) f(std::array<int, 3>{x, y, z});
-    }
-  }
-}
-
-/// Those of a range that are stored, block by block where there are bricks.
-template <class F>
-void each_cell(const Lattice& lattice, const CellRange& range, const F& f) {
-  if (!lattice.in_bricks()) return each_in(range, f);
-  each_in({lattice.block_of(range.first), lattice.block_of(range.last)}, [&](const std::array<int, 3>& block) {
-    CellRange own = range;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const int low = block[axis] * Bricks::kSide;
-      own.first[axis] = std::max(range.first[axis], low);
-      own.last[axis] = std::min(range.last[axis], low + Bricks::kSide - 1);
-    }
-    if (lattice.holds(own.first)) each_in(own, f);
-  });
-}
-
 class Voters {
  public:
   Voters(const Tracer& tracer, const Lattice& lattice, const std::vector<Vec3f>& stands)
       : tracer_(tracer), lattice_(lattice), stands_(stands), face_(smallest_face(lattice)) {}
 
   void add_votes_of(std::uint32_t triangle, std::vector<CornerVote>& votes) const {
-    if (!may_vote(triangle)) return;
     const std::uint64_t count = points_on(faces_of(triangle), kPerCell);
     for (std::uint64_t i = 0; i < count; ++i) add_at(point_of(triangle, i), votes);
   }
   /// Those that kPerBusy has more, where they lie in busy cells.
   void add_more_of(std::uint32_t triangle, const std::vector<bool>& busy, std::vector<CornerVote>& votes) const {
-    if (!may_vote(triangle)) return;
     const double faces = faces_of(triangle);
     for (std::uint64_t i = points_on(faces, kPerCell); i < points_on(faces, kPerBusy); ++i) {
       const SurfacePoint p = point_of(triangle, i);
-      const std::size_t cell = lattice_.cell_index(place_in(lattice_, to_double(p.position)).cell);
-      if (cell != Lattice::kNone && busy[cell]) add_at(p, votes);
+      if (busy[lattice_.cell_index(place_in(lattice_, to_double(p.position)).cell)]) add_at(p, votes);
     }
   }
 
  private:
-  /// Whether any of the cells in the triangle's box is stored.
-  bool may_vote(std::uint32_t triangle) const {
-    const Mesh& mesh = tracer_.scene().mesh;
-    if (!lattice_.in_bricks()) return true;
-    bool any = false;
-    each_cell(lattice_, cell_range(lattice_, mesh, mesh.triangles[triangle]), [&](const auto&) { any = true; });
-    return any;
-  }
   double faces_of(std::uint32_t triangle) const {
     const Mesh& mesh = tracer_.scene().mesh;
     return triangle_area(mesh, mesh.triangles[triangle]) / face_;
@@ -106,7 +58,6 @@ class Voters {
   void add_at(const SurfacePoint& p, std::vector<CornerVote>& votes) const {
     const Scene& scene = tracer_.scene();
     const Part& part = scene.parts[scene.mesh.part[p.triangle]];
-    if (!lattice_.holds(place_in(lattice_, to_double(p.position)).cell)) return;
     votes.push_back(vote(p.position, p.normal, p.geometric_normal));
     if (scene.materials[static_cast<std::size_t>(part.material)].double_sided)
       votes.push_back(vote(p.position, -p.normal, -p.geometric_normal));
@@ -185,7 +136,7 @@ std::uint8_t corners_seen(const Tracer& tracer, const Lattice& lattice, const st
   Rays16 rays;
   rays.ox.fill(from.x), rays.oy.fill(from.y), rays.oz.fill(from.z);
   for (int k = 0; k < 8; ++k) {
-    const Vec3f way = stands[lattice.corner_index(place.cell, k)] - from;
+    const Vec3f way = stands[lattice.index(lattice.corner(place.cell, k))] - from;
     const float distance = length(way);
     const Vec3f w = normalized(way);
     const auto i = static_cast<std::size_t>(k);
@@ -200,13 +151,21 @@ std::vector<bool> cells_with_surface(const Mesh& mesh, const Lattice& lattice) {
   std::vector<bool> out(lattice.cell_count());
   const Vec3d half = lattice.spacing * 0.5;
   for (const Triangle& t : mesh.triangles) {
-    const Vec3d a = to_double(mesh.position[t[0]]),
-                normal = cross(to_double(mesh.position[t[1]]) - a, to_double(mesh.position[t[2]]) - a);
-    each_cell(lattice, cell_range(lattice, mesh, t), [&](const std::array<int, 3>& cell) {
-      // A border cell also stands for the half spacing beyond the outermost vertices: twice the box covers it.
-      const Vec3d middle = lattice.position(cell) + half;
-      if (plane_meets(normal, a, middle, lattice.spacing)) out[lattice.cell_index(cell)] = true;
-    });
+    const Vec3d a = to_double(mesh.position[t[0]]), b = to_double(mesh.position[t[1]]),
+                c = to_double(mesh.position[t[2]]);
+    const Vec3d low{std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y}), std::min({a.z, b.z, c.z})};
+    const Vec3d high{std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y}), std::max({a.z, b.z, c.z})};
+    const auto first = place_in(lattice, low).cell, last = place_in(lattice, high).cell;
+    const Vec3d normal = cross(b - a, c - a);
+    for (int z = first[2]; z <= last[2]; ++z) {
+      for (int y = first[1]; y <= last[1]; ++y) {
+        for (int x = first[0]; x <= last[0]; ++x) {
+          // A border cell also stands for the half spacing beyond the outermost vertices: twice the box covers it.
+          const Vec3d middle = lattice.position({x, y, z}) + half;
+          if (plane_meets(normal, a, middle, lattice.spacing)) out[lattice.cell_index({x, y, z})] = true;
+        }
+      }
+    }
   }
   return out;
 }

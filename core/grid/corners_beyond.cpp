@@ -49,25 +49,11 @@ CornerSet neighbour_seen(const Tracer& tracer, const Lattice& lattice, const std
   return best;
 }
 
-/// What places have that see no corner around, where all cells around are stored.
-CornerSet none_seen(const Lattice& lattice, std::span<const CornerVote> votes) {
-  const CellPlace place{lattice.cell(votes.front().key / kDirections), {}};
-  const std::array<int, 3> count = lattice.cells();
-  for (int k = 0; k < CornerSet::kCells; ++k) {
-    const std::array<int, 3> at{place.cell[0] + k % 3 - 1, place.cell[1] + k / 3 % 3 - 1, place.cell[2] + k / 9 - 1};
-    bool within = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) within = within && at[axis] >= 0 && at[axis] < count[axis];
-    if (within && !lattice.holds(at)) return {};
-  }
-  return {CornerSet::kUnseen, 0xff};
-}
-
 /// What a cell takes from neighbour `step` where no place voted in it: the corners that count there in the middle of
 /// the wall between them, as seen from here. No bits where those lie two cells away.
 CornerSet borrowed(const CornerCut& theirs, const std::array<int, 3>& step) {
   const auto nearest = [&](std::size_t axis) { return std::clamp(0.5 - step[axis], 0.0, 1.0); };
   const CornerSet& set = theirs.at({nearest(0), nearest(1), nearest(2)});
-  if (set.cell == CornerSet::kUnseen) return {};
   const std::array<int, 3> on{set.cell % 3 - 1, set.cell / 3 % 3 - 1, set.cell / 9 - 1};
   int cell = 0;
   for (std::size_t axis = 3; axis-- > 0;) {
@@ -84,10 +70,7 @@ void look_beyond(const Tracer& tracer, const Lattice& lattice, const std::vector
                  std::span<const CornerVote> votes, CornerCut& cut, std::uint64_t& rays) {
   if (cut.offset == 0 && cut.below.bits == 0) {
     const CornerSet beyond = neighbour_seen(tracer, lattice, stands, votes, rays);
-    if (beyond.bits == 0) {
-      cut.below = none_seen(lattice, votes);
-      return;
-    }
+    if (beyond.bits == 0) return;
     std::vector<CornerVote> again(votes.begin(), votes.end());
     for (CornerVote& v : again) {
       const auto moved = moved_into(lattice, {lattice.cell(v.key / kDirections), v.fraction}, beyond.cell);
@@ -104,7 +87,6 @@ void look_beyond(const Tracer& tracer, const Lattice& lattice, const std::vector
       if (&cut.at(v.fraction) == side) own.push_back(v);
     }
     *side = neighbour_seen(tracer, lattice, stands, own, rays);
-    if (side->bits == 0) *side = none_seen(lattice, own);
   }
 }
 
@@ -127,7 +109,7 @@ void fill_grazed(const Lattice& lattice, const std::vector<bool>& crossed, std::
         at[axis] += step[axis];
         within = within && at[axis] >= 0 && at[axis] < count[axis];
       }
-      if (!within || !lattice.holds(at)) continue;
+      if (!within) continue;
       const CornerSet set = borrowed(voted[lattice.cell_index(at)].surface[direction], step);
       if (set.bits != 0) return set;
     }

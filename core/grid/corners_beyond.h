@@ -11,8 +11,7 @@
 namespace kiln {
 
 /// Where no place of a group sees a corner of its cell, they vote again on those of the neighbour they see the most:
-/// a sliver may lie on both sides of another wall. Sides that still see none look into a neighbour of their own, and
-/// are kUnseen, with all of the room's light, where that finds none.
+/// a sliver may lie on both sides of another wall. Sides that still see none look into a neighbour of their own.
 void look_beyond(const Tracer&, const Lattice&, const std::vector<Vec3f>& stands, std::span<const CornerVote>,
                  CornerCut&, std::uint64_t& rays);
 

@@ -45,7 +45,7 @@ Stencil linear_stencil(const Lattice& lattice, const CornersRead& at) {
   Stencil out;
   for (int k = 0; k < 8; ++k) {
     const double w = weight[static_cast<std::size_t>(k)];
-    if (w > 0) out.add(lattice.corner_index(at.place.cell, k), w);
+    if (w > 0) out.add(lattice.index(lattice.corner(at.place.cell, k)), w);
   }
   return out;
 }
@@ -65,9 +65,7 @@ Stencil cubic_stencil(const Lattice& lattice, const CellPlace& place) {
   Stencil out;
   for (int k = 0; k < 64; ++k) {
     const int x = k & 3, y = k >> 2 & 3, z = k >> 4;
-    const std::size_t vertex = lattice.index({along(0, x), along(1, y), along(2, z)});
-    if (vertex == Lattice::kNone) return linear_stencil(lattice, {place});
-    out.add(vertex,
+    out.add(lattice.index({along(0, x), along(1, y), along(2, z)}),
             w[0][static_cast<std::size_t>(x)] * w[1][static_cast<std::size_t>(y)] * w[2][static_cast<std::size_t>(z)]);
   }
   return out;
@@ -95,62 +93,39 @@ std::optional<CellPlace> moved_into(const Lattice& lattice, const CellPlace& pla
     out.fraction[axis] = std::clamp(place.fraction[axis] - step[axis], 0.0, 1.0);
     if (out.cell[axis] < 0 || out.cell[axis] >= cells[axis]) return std::nullopt;
   }
-  if (!lattice.holds(out.cell)) return std::nullopt;
   return out;
-}
-
-GridCounts counts_of(const Grid& grid) {
-  GridCounts out{grid.lattice.vertices(), grid.lattice.bricks.block.size()};
-  for (const Grid& finer : grid.finer) {
-    const GridCounts own = counts_of(finer);
-    out.vertices += own.vertices, out.bricks += own.bricks;
-  }
-  return out;
-}
-
-const Grid& finest_at(const Grid& grid, const Vec3d& position) {
-  for (std::size_t i = grid.finer.size(); i-- > 0;) {
-    const Lattice& lattice = grid.finer[i].lattice;
-    if (lattice.holds(place_in(lattice, position).cell)) return grid.finer[i];
-  }
-  return grid;
 }
 
 CornersRead corners_read(const Grid& grid, const Vec3d& position, const Vec3f& n, GridPlace kind) {
   const CellPlace place = place_in(grid.lattice, position);
   if (grid.cells.empty() || kind == GridPlace::anywhere) return {place};
   const CellCorners& cell = grid.cells[grid.lattice.cell_index(place.cell)];
-  float share = 1;
   if (kind == GridPlace::surface) {
     const CornerSet& set = cell.surface[nearest_direction(n)].at(place.fraction);
-    if (set.cell == CornerSet::kUnseen) {
-      share = static_cast<float>(set.bits) / 255;
-    } else if (const auto moved = moved_into(grid.lattice, place, set.cell); set.bits != 0 && moved) {
-      return {*moved, set.bits};
-    }
+    const auto moved = moved_into(grid.lattice, place, set.cell);
+    if (set.bits != 0 && moved) return {*moved, set.bits};
   }
   const auto& f = place.fraction;
   const std::uint8_t bits = cell.room[(f[0] < 0.5 ? 0U : 1U) | (f[1] < 0.5 ? 0U : 2U) | (f[2] < 0.5 ? 0U : 4U)];
-  return {place, bits == 0 ? std::uint8_t{0xff} : bits, share};
+  return {place, bits == 0 ? std::uint8_t{0xff} : bits};
 }
 
 LinearRead linear_read(const Lattice& lattice, const CornersRead& at) {
   const std::array<double, 8> weight = linear_weights(at);
   LinearRead out;
   for (std::size_t k = 0; k < 8; ++k) {
-    out.vertex[k] = static_cast<std::uint32_t>(lattice.corner_index(at.place.cell, static_cast<int>(k)));
+    out.vertex[k] = static_cast<std::uint32_t>(lattice.index(lattice.corner(at.place.cell, static_cast<int>(k))));
     out.weight[k] = static_cast<float>(weight[k]);
   }
   return out;
 }
 
-Vec3f irradiance_at(const Grid& all, const Vec3d& position, const Vec3f& n, GridPlace kind, GridFilter filter) {
-  const Grid& grid = finest_at(all, position);
+Vec3f irradiance_at(const Grid& grid, const Vec3d& position, const Vec3f& n, GridPlace kind, GridFilter filter) {
   const CornersRead at = corners_read(grid, position, n, kind);
   const Stencil stencil = filter == GridFilter::cubic && at.bits == 0xff ? cubic_stencil(grid.lattice, at.place)
                                                                          : linear_stencil(grid.lattice, at);
-  if (grid.blend == GridBlend::paper) return texel_irradiance(read_parts<kPaperParts>(grid, stencil), n) * at.share;
-  return exact_irradiance(read_parts<kExactParts>(grid, stencil), n) * at.share;
+  if (grid.blend == GridBlend::paper) return texel_irradiance(read_parts<kPaperParts>(grid, stencil), n);
+  return exact_irradiance(read_parts<kExactParts>(grid, stencil), n);
 }
 
 }  // namespace kiln

@@ -5,10 +5,7 @@
 // Corners  A bit for each corner of the cell. At a surface the bits of the axis its normal is nearest to, so that the
 //          two sides of a thin wall look at different corners; a plane through the cell may part places of one
 //          direction, as a floor inside and outside of a wall. In free space the bits of the eighth of the cell.
-//          No bits: as if all were set (the values of vertices inside solids are filled from their neighbours'). Places
-//          of a surface that see no corner of any cell around have a share of that: gaps between sheets are dark.
-// Bricks   `finer` are further lattices over the same box, each finer than the one before and stored in bricks where
-//          the surface asks for them. The finest that stores the cell of a place answers for it.
+//          No bits: as if all were set (the values of vertices inside solids are filled from their neighbours').
 // Paper    Pacanowski et al. 2006, section 3-3.   Differs  visibility of corners (the paper has none and leaks)
 // Cost     trilinear: 9 x 8 or 6 x 8 reads of RGB
 
@@ -30,8 +27,6 @@ enum class GridContent { indirect, all };
 /// (dz + 1) 9 + (dy + 1) 3 + dx + 1. Places are moved into that cell.
 struct CornerSet {
   static constexpr std::uint8_t kOwnCell = 13, kCells = 27;
-  /// None is seen from there: of what the room's corners say bits / 255 arrives.
-  static constexpr std::uint8_t kUnseen = 27;
   std::uint8_t cell = kOwnCell, bits = 0;
   friend bool operator==(const CornerSet&, const CornerSet&) = default;
 };
@@ -74,17 +69,7 @@ struct Grid {
   GridContent content = GridContent::indirect;
   std::vector<std::vector<Vec3f>> parts;  // [part][vertex]
   std::vector<CellCorners> cells;         // empty: every corner counts everywhere
-  std::vector<Grid> finer;                // in bricks: [k] of finer_lattice(lattice, k); none has any of its own
 };
-
-/// Vertices and bricks of all of its lattices.
-struct GridCounts {
-  std::size_t vertices = 0, bricks = 0;
-};
-GridCounts counts_of(const Grid&);
-
-/// The finest that stores the cell of a place, and the cell.
-const Grid& finest_at(const Grid&, const Vec3d& position);
 
 constexpr std::size_t part_count(GridBlend blend) { return blend == GridBlend::exact ? kExactParts : kPaperParts; }
 
@@ -104,11 +89,9 @@ Vec3f irradiance_at(const Grid&, const Vec3d& position, const Vec3f& n, GridPlac
 struct CornersRead {
   CellPlace place;
   std::uint8_t bits = 0xff;
-  float share = 1;  // of what they say, that arrives
 };
-/// Of one lattice, which stores the cell of the place.
 CornersRead corners_read(const Grid&, const Vec3d& position, const Vec3f& n, GridPlace);
-/// The neighbour of a cell that a CornerSet names, and the place moved into it; nothing where it is not stored.
+/// The neighbour of a cell that a CornerSet names, and the place moved into it; nothing beyond the lattice.
 std::optional<CellPlace> moved_into(const Lattice&, const CellPlace&, std::uint8_t cell);
 
 /// The corners of a trilinear look-up and their weights, which sum to 1.

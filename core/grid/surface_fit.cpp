@@ -1,10 +1,7 @@
 #include "core/grid/surface_fit.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
-#include <map>
 
 #include "core/base/expects.h"
 
@@ -186,30 +183,8 @@ Unknowns solve(const Equations& equations, PlaceReadings left, Threads& threads)
 
 }  // namespace
 
-void set_shares(const std::vector<SurfacePlace>& places, Grid& grid) {
-  struct Sums {
-    double light = 0, read = 0;
-  };
-  std::map<CornerSet*, Sums> sets;
-  for (const SurfacePlace& p : places) {
-    if (!p.unseen) continue;
-    const CellPlace place = place_in(grid.lattice, to_double(p.position));
-    CornerCut& cut = grid.cells[grid.lattice.cell_index(place.cell)].surface[nearest_direction(p.normal)];
-    Sums& sums = sets[&cut.at(place.fraction) == &cut.above ? &cut.above : &cut.below];
-    const Vec3f read = irradiance_at(grid, to_double(p.position), p.normal);
-    sums.light += double{p.light.x} + double{p.light.y} + double{p.light.z};
-    sums.read += double{read.x} + double{read.y} + double{read.z};
-  }
-  for (const auto& [set, sums] : sets) {
-    const double share = sums.read > 0 ? std::min(1.0, sums.light / sums.read) : 1;
-    set->bits = static_cast<std::uint8_t>(std::lround(255 * share));
-  }
-}
-
-void fit_to_surface(const std::vector<SurfacePlace>& all, Grid& grid, Threads& threads) {
+void fit_to_surface(const std::vector<SurfacePlace>& places, Grid& grid, Threads& threads) {
   EXPECTS(grid.blend == GridBlend::exact);
-  std::vector<SurfacePlace> places;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(places), [](const SurfacePlace& p) { return !p.unseen; });
   PlaceReadings missing(places.size());
   each(places.size(), threads, [&](std::size_t i) {
     missing[i] = places[i].light - irradiance_at(grid, to_double(places[i].position), places[i].normal);

@@ -21,11 +21,7 @@ namespace kiln {
 inline constexpr float kTrust = 0.3F;
 inline constexpr double kBand1 = 0.7, kBand2 = 0.5;  // the factors of bands 1 and 2
 
-/// The share of what they read that arrives at the unseen among the places: the ratio of the sums of each set. Of sets
-/// without places all of it does.
-void set_shares(const std::vector<SurfacePlace>&, Grid&);
-
-/// Of the places that are not unseen. `grid` is of the exact blend, and places lie in its lattice's lengths.
+/// `grid` is of the exact blend, and places lie in its lattice's lengths.
 void fit_to_surface(const std::vector<SurfacePlace>&, Grid&, Threads&);
 
 }  // namespace kiln

@@ -22,12 +22,6 @@ bool is_double_sided(const Scene& scene, std::uint32_t triangle) {
   return scene.materials[static_cast<std::size_t>(scene.parts[scene.mesh.part[triangle]].material)].double_sided;
 }
 
-bool is_unseen(const Grid& grid, const SurfacePoint& p) {
-  const CellPlace place = place_in(grid.lattice, to_double(p.position));
-  const CellCorners& cell = grid.cells[grid.lattice.cell_index(place.cell)];
-  return cell.surface[nearest_direction(p.normal)].at(place.fraction).cell == CornerSet::kUnseen;
-}
-
 /// Places of one sample of the surface.
 struct Gathering {
   const SphereGather::World& world;
@@ -36,14 +30,12 @@ struct Gathering {
   const SurfaceGather gather;
 
   void add(const SurfacePoint& p, std::uint64_t item, std::vector<SurfacePlace>& out, std::uint64_t& rays) const {
-    if (!grid.lattice.holds(place_in(grid.lattice, to_double(p.position)).cell)) return;
     rays += 9;
     if (is_enclosed(world.tracer, world.faces, {p.position, p.normal, p.position, p.geometric_normal})) return;
     const CornersRead read = corners_read(grid, to_double(p.position), p.normal, GridPlace::surface);
     const Vec3f origin = offset_origin(p.position, p.geometric_normal);
-    const bool unseen = is_unseen(grid, p);
-    if (!unseen && (corners_seen(world.tracer, grid.lattice, stands, read.place, origin) & read.bits) == 0) return;
-    out.push_back({p.position, p.normal, gather.at({origin, p.normal}, item, rays), unseen});
+    if ((corners_seen(world.tracer, grid.lattice, stands, read.place, origin) & read.bits) == 0) return;
+    out.push_back({p.position, p.normal, gather.at({origin, p.normal}, item, rays)});
   }
 };
 

@@ -29,7 +29,6 @@ class SurfaceGather {
 struct SurfacePlace {
   Vec3f position, normal;  // unit cube
   Vec3f light;             // equation 1
-  bool unseen = false;     // by the corners that it reads
 };
 
 struct SurfacePlaces {
@@ -39,9 +38,8 @@ struct SurfacePlaces {
 };
 
 /// Places even over the surface, both sides of it where faces are double-sided. Left out are those inside solids and
-/// those that see none of the corners that count for them: they read light that is not theirs to change. But for sets
-/// of kUnseen they tell the share of that light that arrives. `stands` is where each vertex of the grid gathered
-/// (gather_places).   Same bits for any thread count
+/// those that see none of the corners that count for them: they read light that is not theirs to change.
+/// `stands` is where each vertex of the grid gathered (gather_places).   Same bits for any thread count
 std::vector<SurfacePlace> gather_surface(const SphereGather::World&, const SurfacePlaces&, const Grid&,
                                          const std::vector<Vec3f>& stands, std::uint64_t& rays, Threads&);
 

@@ -7,34 +7,24 @@ import { startBrowser, until, withReady } from './browser.mjs';
 import { jobId, startMock } from './mock_server.mjs';
 import { load } from './sources.mjs';
 
+const bytes = readFileSync(new URL('fixtures/grid.exr', import.meta.url)); // the demo's room at 6 x 5 x 4, with corners
 const { readGrid, irradianceAt } = await load('asset/grid_file.ts');
-/// A grid.exr, and place, normal, irradiance by `kiln eval` on the surface.
-const fixture = (name) => {
-  const bytes = readFileSync(new URL(`fixtures/${name}.exr`, import.meta.url));
-  const lines = readFileSync(new URL(`fixtures/${name}.csv`, import.meta.url), 'utf8').trim().split('\n').slice(1);
-  const grid = readGrid(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
-  return { bytes, grid, surface: lines.map((line) => line.split(',').map(Number)) };
-};
-const { bytes, grid, surface } = fixture('grid'); // the demo's room at 6 x 5 x 4, with corners
-const bricks = fixture('bricks'); // the same room, with bricks
+const grid = readGrid(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+const lines = readFileSync(new URL('fixtures/grid.csv', import.meta.url), 'utf8').trim().split('\n').slice(1);
+const surface = lines.map((line) => line.split(',').map(Number)); // place, normal, irradiance by `kiln eval`
 const kView = `/view/${jobId('done')}`;
 
-let browser, mock, brickMock;
-const serve = async (bytes) => {
-  const mock = await startMock({ files: { 'grid.exr': bytes } });
-  mock.jobs.get(jobId('done')).artifacts.push({ name: 'grid.exr', bytes: bytes.length, media_type: 'image/x-exr' });
-  return mock;
-};
+let browser, mock;
 before(async () => {
-  [browser, mock, brickMock] = [await startBrowser(), await serve(bytes), await serve(bricks.bytes)];
+  [browser, mock] = [await startBrowser(), await startMock({ files: { 'grid.exr': bytes } })];
+  mock.jobs.get(jobId('done')).artifacts.push({ name: 'grid.exr', bytes: bytes.length, media_type: 'image/x-exr' });
 });
 after(async () => {
   await browser.close();
   await mock.close();
-  await brickMock.close();
 });
 
-const withViewer = (hash, act, of = mock) => withReady(browser, `${of.url}${kView}#${hash}`, act);
+const withViewer = (hash, act) => withReady(browser, `${mock.url}${kView}#${hash}`, act);
 
 test('the file is read as it was written', () => {
   assert.deepEqual(grid.size, [6, 5, 4]);
@@ -56,26 +46,11 @@ test('light of a constant grid is the same everywhere and along all normals', ()
     assert.ok(Math.abs(irradianceAt(even, [0.1, 0.2, 0.3], n, 'room')[0] - 3.140625) < 1e-5);
 });
 
-for (const [what, file] of Object.entries({ whole: { grid, surface }, 'in bricks': bricks }))
-  test(`a surface reads what the engine reads of the same file, ${what}`, () => {
-    assert.equal(file.surface.length, 100);
-    for (const [x, y, z, nx, ny, nz, ...truth] of file.surface) {
-      const light = irradianceAt(file.grid, [x, y, z], [nx, ny, nz], 'surface');
-      for (let c = 0; c < 3; ++c) assert.ok(Math.abs(light[c] - truth[c]) < 1e-4, `${light} for ${truth}`); // floats
-    }
-  });
-
-test('bricks are read as they were written', () => {
-  assert.ok(bricks.grid.finer.length > 0);
-  for (const [k, { size, bricks: numbers, parts, corners }] of bricks.grid.finer.entries()) {
-    assert.deepEqual(
-      size,
-      bricks.grid.size.map((n) => n * 2 ** (k + 1)),
-    );
-    const count = numbers.filter((n) => n >= 0).length;
-    assert.ok(count > 0);
-    assert.equal(parts[0].length, 4 * 125 * count);
-    assert.equal(corners.length, 48 * 64 * count);
+test('a surface reads what the engine reads of the same file', () => {
+  assert.equal(surface.length, 100);
+  for (const [x, y, z, nx, ny, nz, ...truth] of surface) {
+    const light = irradianceAt(grid, [x, y, z], [nx, ny, nz], 'surface');
+    for (let c = 0; c < 3; ++c) assert.ok(Math.abs(light[c] - truth[c]) < 1e-4, `${light} for ${truth}`); // floats
   }
 });
 
@@ -107,26 +82,18 @@ const readBall = (page) =>
     };
   });
 
-const testBall = (at, place, what, file, mockOf) =>
-  test(`the ball at ${at} of the grid ${what} is as bright as the file says of a ${place}`, () =>
-    withViewer(
-      `tone=none&ev=1&background=off&ballAt=${at}`,
-      async (page) => {
+for (const place of ['room', 'surface'])
+  for (const at of ['0,0,0', '0.5,-0.6,0.3', '-0.9,0.9,-0.9', '0.2,-0.95,-0.4'])
+    test(`the ball at ${at} of the grid is as bright as the file says of a ${place}`, () =>
+      withViewer(`tone=none&ev=1&background=off&ballAt=${at}`, async (page) => {
         await page.evaluate((on) => (window.kilnGrid.ball.material.uniforms.surface.value = on), place === 'surface');
         const { colour, place: p, normal, exposure } = await readBall(page);
-        const light = irradianceAt(file, p, normal, place);
+        const light = irradianceAt(grid, p, normal, place);
         const expected = light.map((e) => encode(clamp((exposure * 0.8 * e) / Math.PI)));
         assert.ok(Math.max(...expected) > 0.05);
         // A step of 8 bits, half a step of dithering, and what the normal turns within a pixel.
         for (let c = 0; c < 3; ++c) assert.ok(Math.abs(colour[c] - expected[c]) < 3 / 255, `${colour} for ${expected}`);
-      },
-      mockOf(),
-    ));
-for (const place of ['room', 'surface'])
-  for (const at of ['0,0,0', '0.5,-0.6,0.3', '-0.9,0.9,-0.9', '0.2,-0.95,-0.4']) {
-    testBall(at, place, 'stored whole', grid, () => mock);
-    testBall(at, place, 'in bricks', bricks.grid, () => brickMock);
-  }
+      }));
 
 test('a drag moves the ball and not the camera, and the address keeps its place', () =>
   withViewer('background=off', async (page) => {

@@ -4,13 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <numbers>
 
-#include "core/grid/refine.h"
-#include "core/grid/surface_gather.h"
 #include "core/meshless/radiosity.h"
-#include "core/prt/ray_origin.h"
 #include "core/trace/surface.h"
 #include "core/trace/surface_samples.h"
 #include "tests/core/prt/test_scenes.h"
@@ -124,57 +120,6 @@ TEST(BakeGrid, InATurnedFurnaceEveryPlaceOfTheSurfaceReadsItsLight) {
   EXPECT_GT(least, 0.75);
   EXPECT_LT(most, 1.05);
   EXPECT_LT(off, 20);
-}
-
-/// Mean square difference from gathers at the places themselves, over the square of their mean.
-double relative_error(const SphereGather::World& world, const Grid& grid) {
-  const SurfaceGather gather(world, 1024, 7);
-  std::uint64_t rays = 0, item = 0;
-  double square = 0, light = 0;
-  const std::size_t count = 1000;
-  for (const SurfaceSample& s : sample_surface(world.tracer.scene().mesh, count, 4)) {
-    const SurfacePoint p = surface_point(world.tracer.scene(), s.triangle, s.u, s.v);
-    const double truth = gather.at({offset_origin(p.position, p.geometric_normal), p.normal}, item++, rays).x;
-    square += std::pow(truth - irradiance_at(grid, to_double(p.position), p.normal).x, 2);
-    light += truth;
-  }
-  return std::sqrt(square / count) / (light / count);
-}
-
-TEST(Bricks, MendWhatSurfacesReadWrong) {
-  Scene scene = furnace(0.5F);
-  scene.materials.back().emission = {};
-  scene.lights.push_back({.type = LightType::point, .intensity = {1, 1, 1}, .position = {0.2F, 0.1F, -0.4F}});
-  const GridBake params{.size = {5, 5, 5}, .rays = 256};
-  std::vector<BakedGrid> baked;
-  for (const int count : {1, 3}) {
-    Threads threads(count);
-    const Tracer tracer(scene, threads);
-    const RadiosityResult light = solve_radiosity(tracer, nullptr, {.points = {.wanted = 4000}}, threads);
-    const SphereGather::World world{tracer, light.surface->faces(), light.surface.get(), nullptr};
-    baked.push_back(bake_grid(world, params, threads));
-    BakedGrid& grid = baked.back();
-    double before = relative_error(world, grid.grid);
-    for (int pass = 0; pass < 2; ++pass) {
-      const BricksWanted wanted = find_bricks(world, params, {.error = 0.003}, grid.grid, threads);
-      ASSERT_GT(wanted.fresh, 0U) << pass << " has " << wanted.error << " and " << before;
-      // What it finds at its own places is what the grid has at others; of both some hundred tell it to a tenth or so.
-      EXPECT_NEAR(wanted.error, before, 0.35 * before);
-      add_bricks(world, params, wanted, grid, threads);
-      const double after = relative_error(world, grid.grid);
-      EXPECT_LT(after, 0.9 * before) << pass;
-      before = after;
-    }
-    ASSERT_EQ(grid.grid.finer.size(), 2U);
-    // They stand at surfaces: in the open no brick of the finest lattice is stored.
-    EXPECT_FALSE(grid.grid.finer[1].lattice.holds(place_in(grid.grid.finer[1].lattice, {0, 0, 0}).cell));
-    const BricksWanted none = find_bricks(world, params, {.error = 1}, grid.grid, threads);
-    EXPECT_EQ(none.fresh, 0U);
-  }
-  for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_EQ(baked[0].grid.finer[k].parts, baked[1].grid.finer[k].parts);
-    EXPECT_EQ(baked[0].grid.finer[k].cells, baked[1].grid.finer[k].cells);
-  }
 }
 
 TEST(BakeGrid, VerticesInsideSolidsAreFoundAndFilled) {

@@ -58,61 +58,6 @@ TEST(Grid, LinearInterpolationReproducesTrilinearFunctions) {
   }
 }
 
-TEST(Bricks, NumberWhatTheyStoreAndNothingElse) {
-  const Lattice whole =
-      finer_lattice({.size = {5, 4, 3}}, 0);  // 10 x 8 x 6 vertices, 9 x 7 x 5 cells, 3 x 2 x 2 blocks
-  EXPECT_EQ(blocks_along(whole), (std::array<int, 3>{3, 2, 2}));
-  const Lattice l = in_bricks(whole, {0, 1, 11});
-  EXPECT_EQ(l.cell_count(), 3U * Bricks::kCells);
-  // Two bricks side by side share 25 vertices; the last has 2 x 4 x 2 within the lattice, one of them the second has
-  // too.
-  EXPECT_EQ(l.vertices(), 2U * 125 - 25 + 2 * 4 * 2 - 1);
-  for (std::size_t i = 0; i < l.vertices(); ++i) EXPECT_EQ(l.index(l.vertex(i)), i);
-  std::size_t stored = 0;
-  for (std::size_t i = 0; i < whole.cell_count(); ++i) {
-    const std::array<int, 3> cell = whole.cell(i), block = l.block_of(cell);
-    const int number = (block[2] * 2 + block[1]) * 3 + block[0];
-    const bool holds = number == 0 || number == 1 || number == 11;
-    ASSERT_EQ(l.holds(cell), holds);
-    ASSERT_EQ(l.cell_index(cell) == Lattice::kNone, !holds);
-    if (!holds) continue;
-    ++stored;
-    EXPECT_EQ(l.cell(l.cell_index(cell)), cell);
-    for (int k = 0; k < 8; ++k) EXPECT_EQ(l.vertex(l.corner_index(cell, k)), whole.corner(cell, k));
-  }
-  EXPECT_EQ(stored, 64U + 64 + 1 * 3 * 1);
-}
-
-TEST(Bricks, FinerLatticesFillTheSameBox) {
-  const Vec3d low{-1, 2, 3}, high{4, 3, 3};  // flat along z
-  const Lattice base = lattice_over(low, high, {5, 3, 1});
-  const Lattice finer = finer_lattice(base, 1), truth = lattice_over(low, high, {20, 12, 4});
-  EXPECT_EQ(finer.size, truth.size);
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    EXPECT_NEAR(finer.origin[axis], truth.origin[axis], 1e-12);
-    EXPECT_NEAR(finer.spacing[axis], truth.spacing[axis], 1e-12);
-  }
-}
-
-TEST(Bricks, TheFinestThatStoresAPlaceAnswersForIt) {
-  const auto one = [](const Vec3d&) { return 1.0; };
-  const auto linear = [](const Vec3d& p) { return 4 + p.x - p.y / 2; };
-  Grid grid = grid_of(kLattice, one);
-  grid.finer.push_back(grid_of(in_bricks(finer_lattice(kLattice, 0), {0}), linear));
-  const Vec3d inside = finer_lattice(kLattice, 0).position({2, 1, 3}) + Vec3d{0.1, 0.2, 0.05};
-  EXPECT_NEAR(irradiance_at(grid, inside, {1, 0, 0}).x, linear(inside), 1e-5);
-  EXPECT_NEAR(irradiance_at(grid, inside, {1, 0, 0}, GridPlace::surface, GridFilter::cubic).x, linear(inside), 1e-5);
-  EXPECT_FLOAT_EQ(irradiance_at(grid, finer_lattice(kLattice, 0).position({5, 5, 3}), {1, 0, 0}).x, 1);
-}
-
-TEST(Grid, PlacesThatSeeNoCornerHaveAShareOfTheRoomsLight) {
-  Grid grid = grid_of(kLattice, [](const Vec3d&) { return 1.0; });
-  grid.cells.assign(kLattice.cell_count(), {});
-  for (CellCorners& cell : grid.cells) cell.surface[0].below = {CornerSet::kUnseen, 51};
-  EXPECT_FLOAT_EQ(irradiance_at(grid, {3, 2, 2}, {1, 0, 0}).x, 0.2F);
-  EXPECT_FLOAT_EQ(irradiance_at(grid, {3, 2, 2}, {1, 0, 0}, GridPlace::room).x, 1);
-}
-
 TEST(Grid, CubicInterpolationReproducesQuadraticFunctionsInside) {
   // Catmull-Rom: third order where all of 4 x 4 x 4 vertices are there.
   const auto f = [](const Vec3d& p) { return 4 + p.x * p.x - p.y * p.y / 3 + p.x * p.y + 2 * p.z; };

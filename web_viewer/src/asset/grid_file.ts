@@ -5,32 +5,20 @@ import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 
 type Triple = readonly [number, number, number];
 
-/// A lattice stored whole, or in bricks of kBrickSide^3 cells with the vertices at their corners.
-export interface GridLattice {
+export interface GridFile {
+  blend: 'exact' | 'paper';
+  content: 'indirect' | 'all';
   size: Triple; // vertices
   origin: Triple; // world
   spacing: Triple;
-  parts: Uint16Array[]; // RGBA halves, vertex (k * size.y + j) * size.x + i; of bricks one after the other, each likewise
+  scale: number;
+  names: readonly string[]; // of the parts
+  parts: Uint16Array[]; // RGBA halves, vertex (k * size.y + j) * size.x + i
   cells: Triple; // max(1, size - 1)
-  blocks: Triple; // of cells that a brick may store
-  bricks: Int32Array | null; // [block] the brick's number or -1; null: stored whole
   /// kCellBytes a cell: direction, offset, bits below, bits above for +x -x +y -y +z -z, cells below and above of each,
   /// bits of eighths 0 to 7, four unused. Null: every corner counts.
   corners: Uint8Array | null;
 }
-
-export interface GridFile extends GridLattice {
-  blend: 'exact' | 'paper';
-  content: 'indirect' | 'all';
-  scale: number;
-  names: readonly string[]; // of the parts
-  finer: GridLattice[]; // each of twice as many vertices along each axis as the one before; in bricks
-}
-
-export const kBrickSide = 4; // cells
-export const kBrickVertices = (kBrickSide + 1) ** 3;
-export const kBrickCells = kBrickSide ** 3;
-export const kUnseen = 27; // in place of a neighbour: bits / 255 of the room's light arrives
 
 const kExact = ['phi.x', 'phi.y', 'phi.z', 'a.x', 'a.y', 'a.z', 'b.xy', 'b.xz', 'b.yz'];
 const kPaper = ['px', 'nx', 'py', 'ny', 'pz', 'nz'].flatMap((d) => [`${d}.color`, `${d}.direction`]);
@@ -43,7 +31,7 @@ const kCorners = ['px', 'nx', 'py', 'ny', 'pz', 'nz', 'cells.x', 'cells.y', 'cel
   (name) => `corners.${name}`,
 );
 const limitOf = (byte: number): number =>
-  byte < kNeighbourBytes ? (byte % 4 ? 256 : 243) : byte < kRoomBytes ? kUnseen + 1 : 256;
+  byte < kNeighbourBytes ? (byte % 4 ? 256 : 243) : byte < kRoomBytes ? 27 : 256;
 
 interface Part {
   name: string;
@@ -64,7 +52,7 @@ export function readGrid(file: ArrayBuffer): GridFile {
       throw new Error(`grid.exr: ${name} is not three numbers`);
     return numbers as unknown as Triple;
   };
-  if (!['2', '3'].includes(text('kiln.grid'))) throw new Error('grid.exr: kiln.grid is neither 2 nor 3');
+  if (text('kiln.grid') !== '2') throw new Error('grid.exr: kiln.grid is not 2');
   const blend = text('kiln.blend') === 'paper' ? 'paper' : 'exact';
   const size = triple('kiln.size');
   const names = blend === 'exact' ? kExact : kPaper;
@@ -74,58 +62,21 @@ export function readGrid(file: ArrayBuffer): GridFile {
       throw new Error(`grid.exr: part ${name} is missing or has another size`);
     return found.pixels;
   };
-  const hasCorners = parts.some(({ name }) => name.startsWith('corners.'));
-  const read = (prefix: string, { size, origin, spacing }: Placed): GridLattice => {
-    const cells = size.map((n) => Math.max(1, n - 1)) as unknown as Triple;
-    const blocks = cells.map((n) => Math.ceil(n / kBrickSide)) as unknown as Triple;
-    const bricks = prefix ? readBricks(find(`${prefix}bricks`, blocks[0], blocks[1] * blocks[2])) : null;
-    const count = bricks?.reduce((n, brick) => Math.max(n, brick + 1), 0) ?? 0;
-    const vertexRows = bricks ? [kBrickVertices, count] : [size[0], size[1] * size[2]];
-    const cellRows = bricks ? [kBrickCells, count] : [cells[0], cells[1] * cells[2]];
-    return {
-      ...{ size, origin, spacing, cells, blocks, bricks },
-      parts: names.map((name) => find(prefix + name, vertexRows[0], vertexRows[1])),
-      corners: hasCorners
-        ? readCorners((name) => find(prefix + name, cellRows[0], cellRows[1]), cellRows[0] * cellRows[1])
-        : null,
-    };
-  };
-  const base: Placed = { size, origin: triple('kiln.origin'), spacing: triple('kiln.spacing') };
-  const finer = Array.from({ length: Number(text('kiln.finer') || 0) }, (_, k) =>
-    read(`finer.${k + 1}.`, finerPlaced(base, k)),
-  );
+  const cells: Triple = [Math.max(1, size[0] - 1), Math.max(1, size[1] - 1), Math.max(1, size[2] - 1)];
   return {
-    ...read('', base),
     blend,
     content: text('kiln.content') === 'all' ? 'all' : 'indirect',
+    size,
+    origin: triple('kiln.origin'),
+    spacing: triple('kiln.spacing'),
     scale: Number(text('kiln.scale')),
     names,
-    finer,
+    parts: names.map((name) => find(name, size[0], size[1] * size[2])),
+    cells,
+    corners: parts.some(({ name }) => name.startsWith('corners.'))
+      ? readCorners((name) => find(name, cells[0], cells[1] * cells[2]), cells[0] * cells[1] * cells[2])
+      : null,
   };
-}
-
-interface Placed {
-  size: Triple;
-  origin: Triple;
-  spacing: Triple;
-}
-
-/// Lattice k beyond the base: over the same box, 2^(k + 1) times as fine.
-export function finerPlaced({ size, origin, spacing }: Placed, k: number): Placed {
-  const parts = 2 ** (k + 1);
-  const each = (f: (axis: number) => number) => [0, 1, 2].map(f) as unknown as Triple;
-  return {
-    size: each((a) => size[a] * parts),
-    spacing: each((a) => spacing[a] / parts),
-    origin: each((a) => origin[a] - (spacing[a] - spacing[a] / parts) / 2),
-  };
-}
-
-function readBricks(pixels: Uint16Array): Int32Array {
-  return Int32Array.from({ length: pixels.length / 4 }, (_, i) => {
-    const [low, high, stored] = [0, 1, 2].map((c) => DataUtils.fromHalfFloat(pixels[4 * i + c]));
-    return stored ? 1024 * high + low : -1;
-  });
 }
 
 /// EXRLoader reads one part at a time, bottom row first; beyond the last part it reads the last one again.
@@ -163,17 +114,15 @@ const clamp = (x: number, low: number, high: number): number => Math.min(high, M
 
 /// Irradiance of a receiver at `p` with unit normal `n`, as the README says it: what the shader is tested against.
 export function irradianceAt(
-  file: GridFile,
+  grid: GridFile,
   p: Triple,
   n: Triple,
   place: 'surface' | 'room',
 ): [number, number, number] {
-  const stored = file.finer.filter((lattice) => cellIndex(lattice, cellOf(lattice, p)) >= 0);
-  const grid: GridLattice = stored.at(-1) ?? file;
   const t = [0, 1, 2].map((a) => clamp((p[a] - grid.origin[a]) / grid.spacing[a], 0, grid.size[a] - 1));
-  const cell = cellOf(grid, p);
+  const cell = [0, 1, 2].map((a) => clamp(Math.floor(t[a]), 0, Math.max(0, grid.size[a] - 2)));
   const f = [0, 1, 2].map((a) => t[a] - cell[a]);
-  const { bits, share } = cornersRead(grid, cell, f, n, place); // may move cell and f
+  const bits = cornerBits(grid, cell, f, n, place); // may move cell and f
   const weights = Array.from({ length: 8 }, (_, b) =>
     ((bits >> b) & 1) === 0
       ? 0
@@ -182,59 +131,17 @@ export function irradianceAt(
   const sum = weights.reduce((a, b) => a + b, 0);
   const read = (part: number, c: number): number =>
     weights.reduce((value, w, b) => {
-      return value + (w / sum) * DataUtils.fromHalfFloat(grid.parts[part][4 * cornerIndex(grid, cell, b) + c]);
+      const at = [0, 1, 2].map((a) => Math.min(cell[a] + ((b >> a) & 1), grid.size[a] - 1));
+      const i = (at[2] * grid.size[1] + at[1]) * grid.size[0] + at[0];
+      return value + (w / sum) * DataUtils.fromHalfFloat(grid.parts[part][4 * i + c]);
     }, 0);
-  return [0, 1, 2].map((c) => file.scale * share * Math.max(0, blend(file, n, c, read))) as [number, number, number];
+  return [0, 1, 2].map((c) => grid.scale * Math.max(0, blend(grid, n, c, read))) as [number, number, number];
 }
 
-function cellOf(grid: GridLattice, p: Triple): number[] {
-  return [0, 1, 2].map((a) =>
-    clamp(Math.floor((p[a] - grid.origin[a]) / grid.spacing[a]), 0, Math.max(0, grid.size[a] - 2)),
-  );
-}
-
-const flat = (at: number[], [x, y]: readonly number[]): number => (at[2] * y + at[1]) * x + at[0];
-
-function brickOf({ blocks, bricks }: GridLattice, cell: number[]): number {
-  return bricks
-    ? bricks[
-        flat(
-          cell.map((x) => Math.floor(x / kBrickSide)),
-          blocks,
-        )
-      ]
-    : -1;
-}
-
-/// Where the bytes of a cell are, in cells; -1: it is not stored.
-function cellIndex(grid: GridLattice, cell: number[]): number {
-  if (!grid.bricks) return flat(cell, grid.cells);
-  const brick = brickOf(grid, cell);
-  const local = cell.map((x) => x % kBrickSide);
-  return brick < 0 ? -1 : brick * kBrickCells + flat(local, [kBrickSide, kBrickSide]);
-}
-
-/// Where the values of a cell's corner are, in vertices.
-function cornerIndex(grid: GridLattice, cell: number[], b: number): number {
-  if (!grid.bricks) {
-    const at = [0, 1, 2].map((a) => Math.min(cell[a] + ((b >> a) & 1), grid.size[a] - 1));
-    return flat(at, grid.size);
-  }
-  const local = cell.map((x, a) => (x % kBrickSide) + ((b >> a) & 1));
-  return brickOf(grid, cell) * kBrickVertices + flat(local, [kBrickSide + 1, kBrickSide + 1]);
-}
-
-/// Which corners count, and the share of what they say. Moves `cell` and `f` into the cell that they are of.
-function cornersRead(
-  grid: GridLattice,
-  cell: number[],
-  f: number[],
-  n: Triple,
-  place: 'surface' | 'room',
-): { bits: number; share: number } {
-  if (!grid.corners) return { bits: 255, share: 1 };
-  let share = 1;
-  const at = kCellBytes * cellIndex(grid, cell);
+/// Which corners count. Moves `cell` and `f` into the cell that they are of.
+function cornerBits(grid: GridFile, cell: number[], f: number[], n: Triple, place: 'surface' | 'room'): number {
+  if (!grid.corners) return 255;
+  const at = kCellBytes * ((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
   if (place === 'surface') {
     const size = n.map(Math.abs);
     const axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
@@ -245,15 +152,13 @@ function cornersRead(
     const c = grid.corners[at + kNeighbourBytes + 2 * side + above];
     const step = [(c % 3) - 1, (Math.floor(c / 3) % 3) - 1, Math.floor(c / 9) - 1];
     const to = cell.map((x, a) => x + step[a]);
-    if (c === kUnseen) {
-      share = bits / 255;
-    } else if (bits !== 0 && to.every((x, a) => x >= 0 && x < grid.cells[a]) && cellIndex(grid, to) >= 0) {
+    if (bits !== 0 && to.every((x, a) => x >= 0 && x < grid.cells[a])) {
       for (let a = 0; a < 3; ++a) [cell[a], f[a]] = [to[a], clamp(f[a] - step[a], 0, 1)];
-      return { bits, share };
+      return bits;
     }
   }
   const eighth = f.reduce((sum, x, a) => sum + (x >= 0.5 ? 1 << a : 0), 0);
-  return { bits: grid.corners[at + kRoomBytes + eighth] || 255, share };
+  return grid.corners[at + kRoomBytes + eighth] || 255;
 }
 
 function planeHeight(direction: number, f: number[]): number {

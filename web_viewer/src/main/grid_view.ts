@@ -16,7 +16,7 @@ import {
   SphereGeometry,
   Vector3,
 } from 'three';
-import { type GridFile, type GridLattice, kBrickSide, kCellBytes, kRoomBytes } from '../asset/grid_file';
+import { type GridFile, kCellBytes, kRoomBytes } from '../asset/grid_file';
 import { gridMaterial } from '../shaders/grid_material';
 import { GridTextures } from '../shaders/grid_textures';
 import type { Viewer } from './viewer';
@@ -154,7 +154,7 @@ const placeOf = (i: number, [x, y]: GridFile['size']): number[] => [
   Math.floor(i / (x * y)),
 ];
 
-/// Twelve edges for each cell of the base of which not every corner counts everywhere, and for each brick.
+/// Twelve edges for each cell of which not every corner counts everywhere.
 function cellBoxes(grid: GridFile): LineSegments {
   const geometry = new InstancedBufferGeometry();
   const corner = (b: number) => [b & 1, (b >> 1) & 1, (b >> 2) & 1];
@@ -164,14 +164,14 @@ function cellBoxes(grid: GridFile): LineSegments {
       .flatMap((b) => [...corner(b), ...corner(b | (1 << axis))]),
   );
   geometry.setAttribute('position', new BufferAttribute(Float32Array.from(edges), 3));
-  const boxes = [...partialCells(grid), ...grid.finer.flatMap(bricksOf)];
-  geometry.setAttribute('low', new InstancedBufferAttribute(Float32Array.from(boxes.flatMap(({ low }) => low)), 3));
-  geometry.setAttribute('wide', new InstancedBufferAttribute(Float32Array.from(boxes.flatMap(({ wide }) => wide)), 3));
+  geometry.setAttribute('cell', new InstancedBufferAttribute(Float32Array.from(partialCells(grid)), 3));
   const material = new ShaderMaterial({
     vertexShader: /* glsl */ `
-attribute vec3 low, wide;
-void main() { gl_Position = projectionMatrix * viewMatrix * vec4(low + wide * position, 1.0); }`,
+attribute vec3 cell;
+uniform vec3 origin, spacing;
+void main() { gl_Position = projectionMatrix * viewMatrix * vec4(origin + spacing * (cell + position), 1.0); }`,
     fragmentShader: 'void main() { gl_FragColor = vec4(0.15, 0.65, 1.0, 0.35); }',
+    uniforms: { origin: { value: new Vector3(...grid.origin) }, spacing: { value: new Vector3(...grid.spacing) } },
     transparent: true,
     depthWrite: false,
   });
@@ -180,34 +180,15 @@ void main() { gl_Position = projectionMatrix * viewMatrix * vec4(low + wide * po
   return lines;
 }
 
-interface Box {
-  low: number[]; // world
-  wide: number[];
-}
-
-function boxOf({ origin, spacing }: GridLattice, cell: number[], cells: number): Box {
-  return { low: cell.map((x, a) => origin[a] + spacing[a] * x), wide: spacing.map((s) => cells * s) };
-}
-
-function bricksOf(lattice: GridLattice): Box[] {
-  const out: Box[] = [];
-  lattice.bricks?.forEach((brick, block) => {
-    const cell = placeOf(block, lattice.blocks).map((x) => kBrickSide * x);
-    if (brick >= 0) out.push(boxOf(lattice, cell, kBrickSide));
-  });
-  return out;
-}
-
-function partialCells(grid: GridLattice): Box[] {
-  const { corners, cells } = grid;
-  const out: Box[] = [];
+function partialCells({ corners, cells }: GridFile): number[] {
+  const out: number[] = [];
   if (!corners) return out;
   for (let i = 0; i < corners.length / kCellBytes; ++i) {
     const cell = corners.subarray(kCellBytes * i, kCellBytes * (i + 1));
     const sides = [0, 1, 2, 3, 4, 5].flatMap((d) => [cell[4 * d + 2], ...(cell[4 * d + 1] ? [cell[4 * d + 3]] : [])]);
     const rooms = cell.subarray(kRoomBytes, kRoomBytes + 8);
     const whole = sides.every((b) => b === 255 || b === 0) && rooms.every((b) => b === 255);
-    if (!whole) out.push(boxOf(grid, placeOf(i, cells), 1));
+    if (!whole) out.push(...placeOf(i, cells));
   }
   return out;
 }
