@@ -24,8 +24,8 @@ struct FieldPoint {
   Vec3d normal, view;   // unit; the view points to the eye
   Vec3d f0;             // of the surface's specular lobe, and its roughness: for what is kept apart
   double roughness = 1;
-  Vec3d color;  // of its diffuse layer, (1 - metallic) base colour: for (2)
   Vec3d place;  // for lamps
+  Vec3d color;  // of its diffuse layer, (1 - metallic) base colour: for (2)
 };
 
 /// `sky` is null where the field has no visibility of it.
