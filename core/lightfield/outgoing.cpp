@@ -393,7 +393,8 @@ double share_apart(double roughness) { return std::clamp((0.65 - roughness) / 0.
 
 OutgoingLight bake_outgoing(const IncidentLight::World& world, const LitVertices& vertices, const OutgoingBake& params,
                             Threads& threads) {
-  const auto& [scene, value] = vertices;
+  const Scene& scene = vertices.scene;
+  const std::span<const Vec3f> value = vertices.value;
   EXPECTS(value.size() == scene.mesh.position.size());
   EXPECTS(params.degree >= 0 && params.degree <= kMaxLightFieldDegree && params.rays >= 1);
   const std::vector<std::uint32_t> faces = widest_faces(scene.mesh);
